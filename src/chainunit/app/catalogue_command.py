@@ -53,8 +53,8 @@ def _write_templates(folder: Path) -> None:
     from ..drives.catalogue import KINDS
 
     names = {folder / f"{kind.plural.replace(' ', '_')}.csv": kind for kind in KINDS}
-    if there := [str(file) for file in names if file.exists()]:
-        raise InputError(f"{', '.join(there)}: is there already; name another folder by -o")
+    if present := [str(file) for file in names if file.exists()]:
+        raise InputError(f"{', '.join(present)}: is there already; name another folder by -o")
     folder.mkdir(parents=True, exist_ok=True)
     for file, kind in names.items():
         write_file(file, kind.template())

@@ -104,7 +104,7 @@ class _Commands(typer.core.TyperGroup):
         return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """The commands by group, each with its example."""
+        """Write the installed commands into the help by group, each with a line and below it an example."""
         self._take_all()
         listed = [name for group in _GROUPS.values() for name in group]
         others = {
@@ -112,12 +112,13 @@ class _Commands(typer.core.TyperGroup):
             for name, command in self.commands.items()
             if name not in listed and not command.hidden
         }
-        for heading, group in (*_GROUPS.items(), *([("Others", others)] if others else [])):
-            installed = {name: rest for name, rest in group.items() if name in self.commands}
+        for heading, group in (_GROUPS | ({"Others": others} if others else {})).items():
+            rows = []
+            for name, (purpose, example) in group.items():
+                if name in self.commands:
+                    rows += [(name, purpose), ("", example)]
             with formatter.section(heading):
-                formatter.write_dl(
-                    [row for name, rest in installed.items() for row in zip((name, ""), rest, strict=True)]
-                )
+                formatter.write_dl(rows)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """As typer does; a wrong name suggests no hidden command."""
@@ -389,10 +390,10 @@ _INTERRUPTED = "interrupted"
 
 def _told(files: Sequence[Path]) -> str:
     """The files that were written before an interrupt, in words."""
-    there = list(dict.fromkeys(printable(str(file), 500) for file in files if file.exists()))
-    if not there:
+    written = list(dict.fromkeys(printable(str(file), 500) for file in files if file.exists()))
+    if not written:
         return "nothing was written"
-    shown, more = there[:_MOST_FILES], len(there) - _MOST_FILES
+    shown, more = written[:_MOST_FILES], len(written) - _MOST_FILES
     return f"written: {', '.join(shown)}{f' and {more} more' if more > 0 else ''}"
 
 

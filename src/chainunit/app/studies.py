@@ -128,7 +128,7 @@ class Study(StudyMethods):
 
     def _take(self, config: Config, source: str, changes: Mapping[str, Any] | None = None) -> Self:
         """Become the study `config`, which has `changes` against its `source`; paths in it are relative to
-        the source."""
+        the source. Methods call it in place of `__init__`, which would read tables."""
         self._source, self._changes = source, dict(changes or {})
         if self._changes:
             config = config.with_file(source=f"{source} with {self._changed}")
@@ -370,9 +370,8 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
 
     @cached_property
     def answers(self) -> pd.DataFrame:
-        """A table with a row for each answer, by its name in result.json, and a column of numbers for each
-        run. The column "unit" gives the SI unit. A number is NaN where the answer has no meaning in the
-        run."""
+        """A table with a row for each answer, by its name in result.json, and a column of numbers for each run. The
+        column "unit" gives the SI unit. A number is NaN where the answer has no meaning in the run."""
         import pandas as pd
 
         record = self.record
@@ -395,8 +394,7 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
     @cached_property
     def runs(self) -> Mapping[str, xr.Dataset]:
         """The time series of every run by its name, Datasets over ``time``: ``runs["jam_left"]["machine.tau"]``, with
-        units in ``attrs``; ``runs["steady"]`` has the turns in steady running. The file result.nc holds the
-        runs."""
+        units in ``attrs``; ``runs["steady"]`` has the turns in steady running. The file result.nc holds the runs."""
         runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}
         ran = self.record.runs
         return Named(runs | ({"steady": ran.steady} if "steady" in ran.answers else {}))
@@ -431,8 +429,7 @@ def _plain(value: Any) -> Any:
 
 
 def _put(tree: Any, path: list[str], value: Any) -> None:
-    """Set the value at a path in nested tables; a value on the path that is no table is replaced by a
-    table."""
+    """Set the value at a path in nested tables; a value on the path that is no table is replaced by a table."""
     name, *inner = path
     if isinstance(tree, list) and not (name.isdecimal() and int(name) < len(tree)):
         raise InputError(f"{name}: must be the place of an entry, from 0 to {len(tree) - 1}")

@@ -43,12 +43,8 @@ class Dyad(Group):
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The dyad where its outer pins are."""
-        a, b, start, end = (
-            self.first.length,
-            self.second.length,
-            linkage.pins[self.first.pin],
-            linkage.pins[self.second.pin],
-        )
+        a, b = self.first.length, self.second.length
+        start, end = linkage.pins[self.first.pin], linkage.pins[self.second.pin]
         r1, r2 = meeting(xp, start.p, end.p, a * a, b * b, self.side)
         # casadi turns each use of 1/x into a division by x, but keeps -1/x
         per_a, per_b = -1.0 / a, -1.0 / b

@@ -472,12 +472,8 @@ class Contact(Placed):
 
     def slide(self, rates: Rates) -> Slide:
         """The motion of the follower past the cam at the contact."""
-        (seen, turn), n, k, follower = (
-            self._seen(rates, 2),
-            self._spot.normal,
-            self._spot.curvature,
-            rates[0][2],
-        )
+        (seen, turn), follower = self._seen(rates, 2), rates[0][2]
+        n, k = self._spot.normal, self._spot.curvature
         (_, s1, s2), (_, turn1, turn2), t = seen.dot(n.turned()).parts, turn.parts, n.turned()
         if self._roller is None:
             return Slide(t, None, s1, s2 - turn1 * turn1 * self._reach, follower, turn1 / k - s1)

@@ -105,11 +105,8 @@ def assemble(
         factor = weights[comparison.run, comparison.column]
         r = np.abs(comparison.residuals) * factor
         cost += float(np.sum(np.where(r < OUTLIER, r * r, OUTLIER * (2.0 * r - OUTLIER))))
-        root, slopes, places = (
-            np.sqrt(OUTLIER / np.maximum(r, OUTLIER)),
-            comparison.slopes,
-            np.array(comparison.places, int),
-        )
+        root = np.sqrt(OUTLIER / np.maximum(r, OUTLIER))
+        slopes, places = comparison.slopes, np.array(comparison.places, int)
         if np.any(root < 1.0):
             slopes = slopes * root[:, None]
         # the product of a matrix with itself costs half of that of two

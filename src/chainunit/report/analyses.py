@@ -35,10 +35,10 @@ def angle_axis(setup: StudySetup) -> fig.Axis:
 def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
     """The last turn of a run with these crank angles [rad]: the angles from 0 to 2 pi, and `y` over them."""
     turn = 2.0 * math.pi
-    last = angle > angle[-1] - turn
-    place = angle[last] % turn
+    in_last_turn = angle > angle[-1] - turn
+    place = angle[in_last_turn] % turn
     order = np.argsort(place)
-    return place[order], y[last][order]
+    return place[order], y[in_last_turn][order]
 
 
 def _turn(study: StudyRecord) -> Iterator[b.Block]:
@@ -67,6 +67,7 @@ def _turn(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _turn_figure(turn: TurnFindings, angle: fig.Axis, bars: str, driver: str) -> fig.Figure:
+    """The inertia over a turn at constant speed, and the largest reactions."""
     inertia = fig.Curve("inertia", turn.loaded.angle, turn.inertia, in_legend=False)
     panels = [fig.Panel(angle, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
     if turn.pins:
@@ -83,6 +84,7 @@ def _turn_figure(turn: TurnFindings, angle: fig.Axis, bars: str, driver: str) ->
 
 
 def _reactions(turn: TurnFindings) -> fig.Panel:
+    """Bars of the largest reaction of each pin, with feed and without it."""
     pins, items = turn.pins, []
     for look, shift, title, size, angle in (
         (1, -0.2, "with feed", "peak", "angle"),

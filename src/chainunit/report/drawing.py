@@ -87,12 +87,10 @@ class _Canvas:
         room."""
         boxes = [_box(text, place) for place in places]
         nearest, nearest_own = _from_lines(boxes, lines or ()), _from_lines(boxes, own_lines)
-        clear = [
-            min(
-                *(_gap(box, other) for other in self.label_boxes), room, box[0] - 4.0, WIDTH + COLUMN - box[2]
-            )
-            for box, room in zip(boxes, nearest, strict=True)
-        ]
+        clear = []
+        for box, room in zip(boxes, nearest, strict=True):
+            gaps = [_gap(box, other) for other in self.label_boxes]
+            clear.append(min(*gaps, room, box[0] - 4.0, WIDTH + COLUMN - box[2]))
         free = [k for k, room in enumerate(clear) if room >= 3.0]
         beside = (k for k in free if own_lines and nearest_own[k] <= nearest[k])
         best = next(beside, free[0] if free else int(np.argmax(clear)))
@@ -127,17 +125,16 @@ def _from_lines(boxes: Sequence[tuple[float, ...]], lines: Collection[Side]) -> 
 def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
     """The parameters that are lengths in the drawing. Keys are ``("link", name)`` for the length of a link,
     ``("point", link, name)`` for the place of a point on a link, and ``("x", pin)`` and ``("y", pin)`` for the place
-    of a ground pin."""
+    of a ground pin. The linkage is made once with a value for each parameter that no other has: a length with this
+    value is that parameter."""
     layout, model = machine.model.parameter_layout, machine.model
-    marks = {v.name: 1.0 + k / 7919.0 for k, v in enumerate(layout.variables)}
-    parameter_names = {value: name for name, value in marks.items()}
-    variables = {v.name: v for v in layout.variables}
-    marked_linkage = model.linkage(MATH, layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
+    variables = {1.0 + k / 7919.0: v for k, v in enumerate(layout.variables)}
+    marked_values = layout.from_names({v.name: mark for mark, v in variables.items()})
+    marked_linkage = model.linkage(MATH, marked_values, Layout(model.Inputs).from_names({}))
     values = layout.by_name(machine.p)
 
-    def dimension_of(x: Any) -> Dimension | None:
-        name = parameter_names.get(abs(float(x)))
-        v = variables.get(name or "")
+    def dimension_of(length: Any) -> Dimension | None:
+        v = variables.get(abs(float(length)))
         return None if v is None or v.unit != "m" else Dimension(v.name, v.description, values[v.name])
 
     matches: dict[tuple[str, ...], Dimension | None] = {}
@@ -482,33 +479,28 @@ def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground:
     ]
     for pin, place in ground.items():
         if "." in getattr(sizes.get(("x", pin)), "name", ""):
-            first, second = (
-                number(float(coordinate), "m", "millimetres", 4, full=False)
-                for coordinate in (place.x, place.y)
-            )
-            rows.append((pin, f"{first.removesuffix(' mm')}, {second}", "bearing: x, y in the frame"))
-    x, y = WIDTH + 4.0, 40.0
+            x, y = (number(float(size), "m", "millimetres", 4, full=False) for size in (place.x, place.y))
+            rows.append((pin, f"{x.removesuffix(' mm')}, {y}", "bearing: x, y in the frame"))
+    left, top = WIDTH + 4.0, 40.0
     # beside the longest name there is room for the values
     right = max([116.0, *(7.0 * len(name) + 66.0 for name, _, _ in rows)])
     for name, value, description in rows:
-        canvas.add("text", name, x=x, y=y, font_style="italic", fill="#1b1b1b")
-        canvas.add("text", value, x=x + right, y=y, text_anchor="end", fill="#1b1b1b")
+        canvas.add("text", name, x=left, y=top, font_style="italic", fill="#1b1b1b")
+        canvas.add("text", value, x=left + right, y=top, text_anchor="end", fill="#1b1b1b")
         for line in textwrap.wrap(description, max(16, 36 - int((right - 116.0) / 6.0))):
-            canvas.add("text", line, x=x + right + 10.0, y=y, fill="#555555", font_size="11.5")
-            y += 15.0
-        y += 7.0
+            canvas.add("text", line, x=left + right + 10.0, y=top, fill="#555555", font_size="11.5")
+            top += 15.0
+        top += 7.0
 
 
 def _svg(canvas: _Canvas, title: str, height: float) -> str:
+    """The picture as a text of SVG: the tips of its arrows, and the pieces of the canvas."""
+    looks = (("tip", "#c1440e"), ("axis", "#555555"), ("end", "#777777"), ("begin", "#777777"))
     tips = "".join(
         f'<marker id="drawing-{name}" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" '
-        f'orient="auto"><path d="M0 0L8 4L0 8z" fill="{colour}"/></marker>'
-        for name, colour in (("tip", "#c1440e"), ("axis", "#555555"), ("end", "#777777"))
-    )
-    tips += (
-        tips[tips.rindex("<marker") :]
-        .replace("drawing-end", "drawing-begin")
-        .replace('"auto"', '"auto-start-reverse"')
+        f'orient="{"auto-start-reverse" if name == "begin" else "auto"}">'
+        f'<path d="M0 0L8 4L0 8z" fill="{colour}"/></marker>'
+        for name, colour in looks
     )
     size = f"{WIDTH + COLUMN:.0f} {height:.0f}"
     return (

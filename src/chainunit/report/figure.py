@@ -229,7 +229,8 @@ _SPACING = 0.035
 
 
 def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
-    """The lines of a hatch: x and y of their ends, with NaN between two lines."""
+    """The lines of a hatch over the true `cells` of a map: x and y of their ends, with NaN between two lines. Within,
+    u and v go from 0 to 1 over the map, and t along a line."""
     (x0, x1), (y0, y1) = ((float(e[0]), float(e[-1])) for e in (np.asarray(hatch.x), np.asarray(hatch.y)))
     x, y = (np.asarray(hatch.x) - x0) / (x1 - x0), (np.asarray(hatch.y) - y0) / (y1 - y0)
     a, b = _DIRECTIONS[hatch.look % len(_DIRECTIONS)]
@@ -246,13 +247,13 @@ def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
         inside = (column >= 0) & (column < len(x) - 1) & (row >= 0) & (row < len(y) - 1)
         drawn = np.zeros(len(middle), bool)
         drawn[inside] = cells[row[inside], column[inside]]
-        begins = np.flatnonzero(drawn & ~np.concatenate([[False], drawn[:-1]]))
-        stops = np.flatnonzero(drawn & ~np.concatenate([drawn[1:], [False]])) + 1
-        ends += [[t[i], t[j], u0, v0] for i, j in zip(begins, stops, strict=True)]
-    table = np.array(ends).reshape(-1, 4)
-    gap = np.full(len(table), np.nan)
-    u = np.stack([table[:, 2] - b * table[:, 0], table[:, 2] - b * table[:, 1], gap], axis=1).ravel()
-    v = np.stack([table[:, 3] + a * table[:, 0], table[:, 3] + a * table[:, 1], gap], axis=1).ravel()
+        edges = np.diff(np.concatenate([[False], drawn, [False]]).astype(int))
+        for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+            ends.append([t[begin], t[end], u0, v0])
+    begins, stops, u_feet, v_feet = np.array(ends).reshape(-1, 4).T
+    gaps = np.full(len(begins), np.nan)
+    u = np.stack([u_feet - b * begins, u_feet - b * stops, gaps], axis=1).ravel()
+    v = np.stack([v_feet + a * begins, v_feet + a * stops, gaps], axis=1).ravel()
     return x0 + (x1 - x0) * u, y0 + (y1 - y0) * v
 
 
@@ -271,18 +272,16 @@ def in_units(figure: Figure, units: Units) -> Figure:
         return float(result) if result.ndim == 0 else result
 
     def panel(original: Panel, row: int) -> Panel:
-        axes = {"x": original.x, "y": original.y}
-        scales = {
-            on: scales_of_size(sizes[_shared(figure, on, axis, row)], axis.unit, axis.kind, units)
-            for on, axis in axes.items()
-        }
-        items = (
-            replace(
-                item,
-                **{name: shown(getattr(item, name), *scales[on][0][1:]) for name, on in along(item).items()},
-            )
-            for item in original.items
-        )
+        """A panel of that row of the figure, with its items and its axes as shown."""
+        axes, scales, items = {"x": original.x, "y": original.y}, {}, []
+        for on, axis in axes.items():
+            scales[on] = scales_of_size(sizes[_shared(figure, on, axis, row)], axis.unit, axis.kind, units)
+        for item in original.items:
+            values = {}
+            for name, on in along(item).items():
+                _, factor, offset = scales[on][0]
+                values[name] = shown(getattr(item, name), factor, offset)
+            items.append(replace(item, **values))
         x, y = (_with_unit(axis, scales[on]) for on, axis in axes.items())
         return replace(original, x=x, y=y, items=tuple(items))
 
@@ -300,14 +299,14 @@ def _sizes(figure: Figure) -> dict[tuple[Any, ...], float]:
     sizes: dict[tuple[Any, ...], float] = {}
     for row, _, panel in figure.all_panels():
         for on, axis in (("x", panel.x), ("y", panel.y)):
-            every = [
+            values = [
                 np.abs(np.asarray(getattr(item, name), float)).ravel()
                 for item in panel.items
                 for name, along_axis in along(item).items()
                 if along_axis == on
             ]
-            every.append(np.abs([x for x in (axis.low, axis.high) if x is not None]))
-            table = np.concatenate(every)
+            values.append(np.abs([x for x in (axis.low, axis.high) if x is not None]))
+            table = np.concatenate(values)
             key = _shared(figure, on, axis, row)
             sizes[key] = float(np.max(table[np.isfinite(table)], initial=sizes.get(key, 0.0)))
     return sizes

@@ -109,6 +109,7 @@ def _group_title(runs: StudyRuns, names: list[str]) -> str:
 
 @PICTURES.declare(lambda study: study.setup.statics.cycles, "torque_angle.png")
 def _turn(study: StudyRecord) -> fig.Figure:
+    """Torques and inertia over a turn at constant speed, by load case."""
     setup, driver, cycles = study.setup, study.setup.driver_noun, study.setup.statics.cycles
     torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
     organs = bool(setup.drive.machine.model.sides)
@@ -202,6 +203,7 @@ def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
     "force_over_stroke.png",
 )
 def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
+    """The forces over the stroke in steady running and in each overload."""
     runs, drive = study.runs, study.setup.drive
     names = [name for name in run_names.motor_runs(runs) if run_names.event_time(runs, name) is not None]
     parts = {"steady": runs.steady} | {name: run_names.from_event(runs, name) for name in names}
@@ -211,45 +213,42 @@ def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
 
 @PICTURES.declare(lambda study: study.setup.statics.loops, "speed_loop.png")
 def _speed_loop(study: StudyRecord) -> fig.Figure:
-    loops = list(enumerate(study.setup.statics.loops.items()))
-    ends = [loop.frequency[k] for _, (_, loop) in loops for k in (0, -1)]
-    frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
-    narrowest = min(study.setup.statics.loops.values(), key=lambda loop: loop.phase_margin)
-    longest = 1.5 * max(loop.settling for loop in study.setup.statics.loops.values())
-    time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
-    panels = (
-        (frequency, fig.Axis("gain of the open loop", log=True), "frequency", "gain", "Gain"),
-        (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
-        (time, fig.Axis("speed deviation", "rad/(N.m.s)"), "time", "deviation", "Disturbance step"),
-    )
+    """Gain, phase and disturbance step of the speed loops, with crossover and phase margin of the narrowest one."""
+    loops = study.setup.statics.loops
+    narrowest = min(loops.values(), key=lambda loop: loop.phase_margin)
 
-    def items(over: str, ordinate: str) -> Iterator[fig.Item]:
-        yield from (
-            fig.Curve(name, getattr(loop, over), getattr(loop, ordinate), look)
-            for look, (name, loop) in loops
-        )
-        if ordinate == "gain":
-            yield fig.Mark(1.0, axis="y", look="thin")
-        if ordinate == "phase":
-            yield fig.Mark(-180.0, axis="y", look="thin")
-        if ordinate in ("gain", "phase"):
-            yield fig.Mark(narrowest.crossover, "crossover", look="mark")
-        if ordinate == "phase":
-            margin = narrowest.phase_margin
-            yield fig.Label(
-                narrowest.crossover, -180.0 + margin, f"margin {number_words(margin, 'deg')}", "left"
-            )
+    def curves(abscissa: str, ordinate: str) -> Iterator[fig.Curve]:
+        for look, (name, loop) in enumerate(loops.items()):
+            yield fig.Curve(name, getattr(loop, abscissa), getattr(loop, ordinate), look)
+
+    crossover = fig.Mark(narrowest.crossover, "crossover", look="mark")
+    margin = f"margin {number_words(narrowest.phase_margin, 'deg')}"
+    margin_label = fig.Label(narrowest.crossover, -180.0 + narrowest.phase_margin, margin, "left")
+    gain_items: tuple[fig.Item, ...] = (
+        *curves("frequency", "gain"),
+        fig.Mark(1.0, axis="y", look="thin"),
+        crossover,
+    )
+    limit = fig.Mark(-180.0, axis="y", look="thin")
+    phase_items: tuple[fig.Item, ...] = *curves("frequency", "phase"), limit, crossover, margin_label
+    ends = [loop.frequency[k] for loop in loops.values() for k in (0, -1)]
+    frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
+    phase = fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0)
+    longest = 1.5 * max(loop.settling for loop in loops.values())
+    time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
+    deviation = fig.Axis("speed deviation", "rad/(N.m.s)")
+    panels = (
+        fig.Panel(frequency, fig.Axis("gain of the open loop", log=True), gain_items, "Gain"),
+        fig.Panel(frequency, phase, phase_items, "Phase"),
+        fig.Panel(time, deviation, tuple(curves("time", "deviation")), "Disturbance step"),
+    )
 
     return fig.Figure(
         "speed-loop",
         "The speed loop, linearised",
         "Gain and phase of the open speed loop over the frequency, and the deviation of the motor speed after a step "
         "of the load torque.",
-        (
-            tuple(
-                fig.Panel(x, y, tuple(items(over, ordinate)), title) for x, y, over, ordinate, title in panels
-            ),
-        ),
+        (panels,),
         heights=(1.4,),
     )
 
@@ -307,8 +306,8 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         items[TORQUE] = shaft_torque(run, time)
     if event is None and drive.follows:
         asked = study.setup.config.run.crank_speed
-        wanted = run["motor.w_ref"].values * (asked / drive.reference_speed(asked))
-        speed.append(fig.Curve("speed asked for", time, wanted, 1))
+        reference = run["motor.w_ref"].values * (asked / drive.reference_speed(asked))
+        speed.append(fig.Curve("speed asked for", time, reference, 1))
     coasting = study.runs.series.get(name + run_names.COASTING)
     if coasting is not None:
         behind, stands = _coasting(study.setup, coasting, event or 0.0)
@@ -423,31 +422,29 @@ def _assumed(runs: StudyRuns, run: str) -> Line:
 
 @PICTURES.declare(lambda study: study.runs.pins, "reactions.png")
 def _reactions(study: StudyRecord) -> fig.Figure:
+    """Bars of the forces in each bearing: peak and RMS in one run, and the largest peak of all runs."""
     reference = "steady" if "steady" in study.runs.pins else next(iter(study.runs.pins))
     steady, pins = study.runs.pins[reference], list(study.runs.pins[reference])
     largest = {pin: hardest_run(study.runs.pins, pin) for pin in pins}
     of_run, driver = run_names.title(study.runs, reference), study.setup.driver_noun
     places = np.arange(len(pins), dtype=float)
-    bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [
-        (f"{of_run}: peak", -0.2, [steady[pin]["peak"] for pin in pins], 0.38, 0, False, ()),
-        (f"{of_run}: RMS", -0.2, [steady[pin]["rms"] for pin in pins], 0.14, 0, True, ()),
+    peaks, rms = ([steady[pin][size] for pin in pins] for size in ("peak", "rms"))
+    bars = [
+        fig.Bars(f"{of_run}: peak", places - 0.2, peaks, 0.38, 0),
+        fig.Bars(f"{of_run}: RMS", places - 0.2, rms, 0.14, 0, slim=True),
     ]
     if len(study.runs.pins) > 1:
         titles = tuple(study.runs.title_of(largest[pin]) for pin in pins)
         peaks = [study.runs.pins[largest[pin]][pin]["peak"] for pin in pins]
-        bars.append(("largest peak of all runs", 0.2, peaks, 0.38, 1, False, titles))
-    items = tuple(
-        fig.Bars(name, places + shift, sizes, height, look, slim=slim, words=beside)
-        for name, shift, sizes, height, look, slim, beside in bars
-    )
-    most = max(size or 0.0 for _, _, sizes, *_ in bars for size in sizes)
+        bars.append(fig.Bars("largest peak of all runs", places + 0.2, peaks, 0.38, 1, words=titles))
+    most = max(size or 0.0 for sizes in (peaks, rms) for size in sizes)
     # beside the bars there is room for the names of runs
     x = fig.Axis("reaction", "N", low=0.0, high=(1.6 if len(study.runs.pins) > 1 else 1.05) * most or None)
     return fig.Figure(
         "reactions",
         "Forces in the pins",
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
-        ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
+        ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), tuple(bars)),),),
         f"RMS is taken over whole {driver} turns of {of_run}. Beside a bar: the run of the largest peak.",
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

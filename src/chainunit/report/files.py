@@ -22,6 +22,7 @@ def writers(report: Report, folder: Path, name: str, png: bool = False) -> list[
         return write_file(folder / f"{name}.json", numbers_text(report))
 
     def draw() -> list[Path]:
+        """Write the drawings, and the figures as `png`; `text` names them after that."""
         for drawing in report.drawings:
             pictures.extend(write_file(folder / drawing.file, drawing.svg))
         if png:

@@ -155,6 +155,7 @@ def packed(data: Any) -> str:
 
 
 def _shortened(data: Any) -> Any:
+    """Data whose long series of numbers are packed, see `_series`."""
     if isinstance(data, dict):
         return {name: _shortened(x) for name, x in data.items()}
     if isinstance(data, list | tuple):
@@ -200,11 +201,6 @@ def _short(name: str) -> str:
 def _origin_words(origin: str) -> str:
     """The origin of a given value in words; another origin than those of a study is the question that chose it."""
     return _ORIGIN.get(origin, "the program's default" if origin == "declared" else f"chosen by {origin}")
-
-
-def _named(value: b.GivenValue) -> str:
-    """The name of a given value, with its file and line."""
-    return f"{value.name}: {value.place}" if value.place else value.name
 
 
 def marks(block: b.Given) -> str:
@@ -257,6 +253,7 @@ class Page:
         return "".join(map(self._piece, pieces(line)))
 
     def _piece(self, piece: Piece) -> str:
+        """A piece of a line."""
         match piece:
             case Number():
                 return self.number(piece)
@@ -320,6 +317,7 @@ class Page:
         return f'<p class="lead">{escape(block.lead)}</p>\n{resource("live/live.html")}'
 
     def _verdict(self, verdict: b.Judgement) -> str:
+        """A judgement, with its sign; a warning is an entry of a list."""
         text = self.line(verdict.line)
         items = "".join(f"<li>{self.line(item)}</li>" for item in verdict.items)
         if verdict.severity in ("alarm", "remark"):
@@ -330,6 +328,7 @@ class Page:
         return f'<p class="judged {verdict.severity}">{sign} {text}</p>'
 
     def _card(self, card: b.Card) -> str:
+        """A card: large numbers with their nouns, and further lines."""
         figures = "".join(
             f'<div class="figure"><span class="large{"" if isinstance(value, Number) else " name"}">'
             f'{self.line(value)}</span><span class="which">{escape(which)}</span></div>'
@@ -342,6 +341,7 @@ class Page:
         )
 
     def _table(self, table: b.Table) -> str:
+        """A table, which a narrow screen scrolls."""
         marks = [' class="text"' if column.of_text else "" for column in table.columns] or [""] * table.width
         heads = "".join(
             f'<th scope="col"{mark}>{self.line(column.title)}</th>'
@@ -361,6 +361,7 @@ class Page:
         )
 
     def _row(self, row: b.TableRow, marks: Sequence[str]) -> str:
+        """A row; one with a note has it in a second row."""
         first, *others = row.cells
         span = ' rowspan="2"' if row.note else ""
         cells = (
@@ -378,6 +379,7 @@ class Page:
         return f"<td{css}>{self._inside(cell)}</td>"
 
     def _inside(self, cell: b.Cell) -> str:
+        """The content of a cell; a share has a bar."""
         if not isinstance(cell, b.Share):
             return self.line(cell)
         share = cell.utilisation.value or 0.0
@@ -387,11 +389,12 @@ class Page:
         return self.number(cell.utilisation) + bar + suffix
 
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
-        rows = "".join(
-            f'<tr><th scope="row" title="{escape(_named(value))}">{escape(value.description)}</th>'
-            f"<td>{self.line(value.value)}{self.origin(value)}</td></tr>"
-            for value in values
-        )
+        """A section of given values."""
+        rows = ""
+        for value in values:
+            name_and_line = f"{value.name}: {value.place}" if value.place else value.name
+            rows += f'<tr><th scope="row" title="{escape(name_and_line)}">{escape(value.description)}</th>'
+            rows += f"<td>{self.line(value.value)}{self.origin(value)}</td></tr>"
         return (
             f'<div class="wide"><table class="numbers"><caption>{escape(title)}</caption>'
             f"<tbody>{rows}</tbody></table></div>"
@@ -405,6 +408,7 @@ class Page:
         return f'<abbr class="from" title="{escape(_origin_words(value.origin))}">{escape(mark)}</abbr>'
 
     def _figure(self, figure: Figure) -> str:
+        """The box in which the script of the page draws a figure."""
         from .page_figures import height
 
         return (
@@ -419,12 +423,10 @@ class Page:
 
     def header(self, report: b.Report, title: str, names: Iterable[str]) -> str:
         """Title, source, status, navigation, and the blocks before all sections."""
-        status = (
-            '<p class="alarm"><strong>The run stopped early:</strong> '
-            f"{self.line(report.failure)}. The page shows the results up to there.</p>"
-            if report.failure
-            else ""
-        )
+        status = ""
+        if report.failure:
+            status = '<p class="alarm"><strong>The run stopped early:</strong> '
+            status += f"{self.line(report.failure)}. The page shows the results up to there.</p>"
         headings = {section.name: section.heading for section in report.sections}
         links = "".join(f'<a href="#{name}">{headings[name]}</a>' for name in names)
         opening = self.blocks(b.of_form(report.opening, "long"))

@@ -30,22 +30,23 @@ def links(linkage: Linkage) -> Iterator[DrawnLink]:
 
 
 def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
-    """The ends of the way of each block that slides in the ground, by its pin [m]; `turn` is the mechanism over a
-    whole turn."""
-    ways = {}
+    """The ends of a rail for each block that slides in the ground, by its pin [m]: its way and a quarter more at each
+    end. `turn` is the mechanism over a whole turn."""
+    rail_ends = {}
     for connections in turn.topology.groups:
         for joint, carrier, _ in connections.joints:
-            if joint in turn.slides and turn.slides[joint].s is not None and carrier is None:
-                place, d = turn.pins[joint[0]].p, turn.slides[joint].d
-                s = np.atleast_1d(turn.slides[joint].s)
-                x, y = (np.broadcast_to(v, s.shape) for v in (place.x, place.y))
-                low, high = int(np.argmin(s)), int(np.argmax(s))
-                margin = 0.25 * float(np.ptp(s)) + 1e-9
-                dx, dy = (float(np.atleast_1d(v)[0]) * margin for v in (d.x, d.y))
-                ways[joint[0]] = (
-                    (float(x[low]) - dx, float(y[low]) - dy), (float(x[high]) + dx, float(y[high]) + dy)
-                )  # fmt: skip
-    return ways
+            slide = turn.slides.get(joint)
+            if slide is None or slide.s is None or carrier is not None:
+                continue
+            pin, s = joint[0], np.atleast_1d(slide.s)
+            x, y = (np.broadcast_to(v, s.shape) for v in (turn.pins[pin].p.x, turn.pins[pin].p.y))
+            low, high = int(np.argmin(s)), int(np.argmax(s))
+            # a block that stands still has a rail, too
+            margin = 0.25 * float(np.ptp(s)) + 1e-9
+            dx, dy = (float(np.atleast_1d(v)[0]) * margin for v in (slide.d.x, slide.d.y))
+            begin, end = (float(x[low]) - dx, float(y[low]) - dy), (float(x[high]) + dx, float(y[high]) + dy)
+            rail_ends[pin] = begin, end
+    return rail_ends
 
 
 def paths(turn: Mechanism, further: str = "") -> dict[str, tuple[Any, Any]]:

@@ -74,6 +74,8 @@ def linkage_report(
 
 
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
+    """The live machine of the linkage."""
+
     def make() -> b.LiveMachine:
         # a page alone needs it
         from .live.machine import of_linkage
@@ -84,6 +86,7 @@ def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
 
 
 def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
+    """The groups and drivers in sentences, remarks on the file, and a drawing."""
     further = f.description.further
     lead = "The driver gives one degree of freedom: "
     if further.free:
@@ -195,8 +198,9 @@ def _animation(f: LinkageFindings) -> Animation:
     """The moving picture of a turn, or of the way there and back, at constant speed."""
     machine = f.machine
     low, _ = f.description.span
-    step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES
-    q, speed = f.q[::step], np.full(_PICTURES // (2 if f.back else 1) + 1, f.speed)
+    ways = 2 if f.back else 1
+    step = ways * (len(f.q) - 1) // _PICTURES
+    q, speed = f.q[::step], np.full(_PICTURES // ways + 1, f.speed)
     time = (q - low) / f.speed
     if f.back:  # the last place is that of the way back, too
         q, speed = np.concatenate([q, q[-2::-1]]), np.concatenate([speed, -speed[1:]])
@@ -245,8 +249,9 @@ def _ways(f: LinkageFindings) -> dict[str, LinkageFindings]:
 
 
 def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
-    there = ", there and back over its range" if f.back else ""
-    lead = f"Inverse dynamics at {{}} of the driver{there}, with the loads of normal running."
+    """Tables and figures of effort, power, inertia and reactions, by way of the driver."""
+    both_ways = ", there and back over its range" if f.back else ""
+    lead = f"Inverse dynamics at {{}} of the driver{both_ways}, with the loads of normal running."
     yield b.Text(filled(lead, exact(x.speed, 4)), "lead", central=True)
     effort, inertia = machine_picture.driver_nouns(f.machine)
     for way, forces in {"forth": x.forces, "back": x.back.forces}.items() if x.back else (("", x.forces),):
@@ -347,6 +352,7 @@ def _along(f: LinkageFindings, name: str) -> Line:
 
 
 def _variables(f: LinkageFindings) -> Iterator[b.Block]:
+    """Parameters and inputs with their values."""
     model = f.machine.model
     for title, layout, values in (
         ("Parameters", model.parameter_layout, f.machine.by_name),

@@ -54,6 +54,7 @@ def _equilibria(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b
     driver."""
 
     def place(equilibrium: Equilibrium) -> Line:
+        """The place of an equilibrium, or the ends of its range."""
         begin = number(equilibrium.place)
         is_range = equilibrium.kind == INDIFFERENT
         return filled("{} to {}", begin, number(equilibrium.end)) if is_range else begin
@@ -128,6 +129,7 @@ def _notes(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Bloc
 
 
 def _figure(f: LinkageFindings, effort: str, file: str) -> fig.Figure:
+    """Holding effort and potential over the way of the driver, with the equilibria."""
     unit, rest = f.machine.model.driver_port.unit, f.rest.rest
     place = machine_picture.driver_axis(f.machine, float(rest.q[0]), float(rest.q[-1]))
     panels = [(fig.Axis(f"holding {effort}", unit("N.m")), rest.holding)]

@@ -24,17 +24,17 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
     """The parts of the picture of a machine that no run changes; `way` is its mechanism over the whole way of its
     driver."""
     driver, turns = way.linkage.driver, machine.model.turns
-    circles = [(driver.bar.pin, driver.end)] * (turns and isinstance(driver, Crank))
+    circles = [(driver.bar.pin, driver.end)] if turns and isinstance(driver, Crank) else []
+    outlines = {}
+    for name, outline in way.linkage.outlines.items():
+        corners = outline.points()
+        outlines[name] = {"at": outline.pin, "points": np.round([corners.x, corners.y], 6).T.tolist()}
     return Animation(
         tuple(linkage.links(way.linkage)),
         linkage.supports(way.linkage),
         hanging=linkage.hanging(way),
         circles=(*circles, *way.linkage.circles),
-        outlines={
-            name: {"at": pin, "points": np.round([place.x, place.y], 6).T.tolist()}
-            for name, (pin, _, points) in way.linkage.outlines.items()
-            for place in [points()]
-        },
+        outlines=outlines,
         names=linkage.labels(way.linkage),
         paths=linkage.paths(way, "" if turns else driver.end),
         rails=linkage.rails(way),
@@ -113,11 +113,8 @@ def loads_on_slides(state: MachineState) -> dict[str, tuple[Any, Any]]:
             forces = [wrench.force for wrench in wrenches if wrench.link == joint[1]]
             if joint in m.slides and m.slides[joint].s is not None and carrier is None and forces:
                 slide, place = m.slides[joint], m.pins[joint[0]].p
-                way, force = (
-                    np.broadcast_to(x, np.shape(m.q))
-                    for x in (slide.d.dot(place), sum(f.dot(slide.d) for f in forces))
-                )
-                along[joint[1]] = way, force
+                way, force = slide.d.dot(place), sum(f.dot(slide.d) for f in forces)
+                along[joint[1]] = np.broadcast_to(way, np.shape(m.q)), np.broadcast_to(force, np.shape(m.q))
     return along
 
 

@@ -39,6 +39,7 @@ def _line(line: Line, units: Units) -> str:
 
 
 def _grid(rows: Iterable[Iterable[str]], head: Iterable[str]) -> Iterator[str]:
+    """The lines of a table in Markdown."""
     heads = list(head)
     yield f"| {' | '.join(heads)} |"
     yield "|---" * len(heads) + "|"
@@ -91,6 +92,7 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
 
 
 def _table(table: Table, units: Units) -> list[str]:
+    """The lines of a table, with its title and its notes."""
     heads = [_line(column.title, units) for column in table.columns] or [
         "quantity",
         *[""] * (table.width - 1),

@@ -97,14 +97,12 @@ class Animation:
 def pictures(animation: Animation, units: Units) -> dict[str, Any]:
     """The animation, ready for JSON. Joints are exact to 1e-5 of the size of the linkage, forces to 1e-4 of the
     largest force of their run."""
-    ends = [
-        (float(np.min(v)), float(np.max(v)))
-        for run in animation.runs
-        for xy in run.joints.values()
-        for v in xy
-    ]
-    reach = max((high - low for low, high in ends), default=1.0)
-    reach = max(reach, *(abs(end) for both in ends for end in both))
+    lows, highs = [], []
+    for coordinate in (v for run in animation.runs for xy in run.joints.values() for v in xy):
+        lows.append(float(np.min(coordinate)))
+        highs.append(float(np.max(coordinate)))
+    reach = max((high - low for low, high in zip(lows, highs, strict=True)), default=1.0)
+    reach = max(reach, *map(abs, (*lows, *highs)))
     return {
         "links": [asdict(link) for link in animation.links],
         "grounds": animation.grounds,
@@ -158,6 +156,7 @@ def _run(run: Clip, reach: float, units: Units) -> dict[str, Any]:
 
 
 def _reading(reading: Reading, units: Units) -> dict[str, Any]:
+    """A reading in the unit that is shown, as data of the page."""
     unit, factor, offset = scales(reading.unit, reading.kind, units)[0]
     values = factor * np.asarray(reading.values, float) + offset
     return {"title": reading.title, "unit": unit_text(unit), "values": _list(values, None, 4)}

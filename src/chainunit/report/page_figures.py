@@ -198,9 +198,11 @@ class _Drawing:
         }
         legend = _legend_rows(spec, _PHONE)
         if len(spec.panels[0]) == 1:
+            # panels that are below each other already: only the legend may take more rows
             more = max(0, legend - _legend_rows(spec))
             bottom = {"margin.b": 52 + _legend_rows(spec) + more} if more else {}
             return (changes or bottom) and {"height": height(spec) + more, **bottom, **changes}
+        # column by column; the domains of the axes are shares of the height, from the top
         places = sorted(self.places, key=lambda place: (place[1], place[0]))
         sizes = [_row(spec) * min(spec.row_heights[r], 1.1) for r, _ in places]
         gaps = [_gap(spec, self.places[a][0] == self.places[b][0]) for a, b in pairwise(places)]
@@ -215,23 +217,25 @@ class _Drawing:
             begin += size + gap
         return changes
 
-    def panel(self, r: int, c: int, panel: Panel) -> None:
-        """Draw a panel into its place."""
-        beside = [y for (row, _), (_, y) in self.places.items() if row == r]
-        y = f"y{len(self.places) + 1 if self.places else ''}"
-        x = self.x_axes.setdefault(
-            (c, self.spec.sharing(r, c)[0]), f"x{len(self.x_axes) + 1 if self.x_axes else ''}"
-        )
-        self.places[r, c] = x, y
-        across = self.axes.setdefault(_long(x), {"domain": self.columns[c], **_axis(panel.x)})
-        if r == self.spec.sharing(r, c)[-1]:
-            across |= {"anchor": y, "title": {"text": panel.x.label}}
-        self.axes[_long(y)] = {"domain": self.rows[r], "anchor": x, **_axis(panel.y)}
-        self.axes[_long(y)] |= {"title": {"text": panel.y.label}} | (
-            {"scaleanchor": x} if panel.equal else {}
-        )
+    def panel(self, row: int, column: int, panel: Panel) -> None:
+        """Draw a panel into its place, with a y axis of its own and an x axis that the panels below it may share.
+        Plotly names axes x, x2, .. and y, y2, .."""
+        beside = [y for (other_row, _), (_, y) in self.places.items() if other_row == row]
+        sharing = self.spec.sharing(row, column)
+        y = f"y{len(self.places) + 1}" if self.places else "y"
+        next_x = f"x{len(self.x_axes) + 1}" if self.x_axes else "x"
+        x = self.x_axes.setdefault((column, sharing[0]), next_x)
+        self.places[row, column] = x, y
+        x_axis = self.axes.setdefault(_long(x), {"domain": self.columns[column], **_axis(panel.x)})
+        if row == sharing[-1]:
+            # the lowest panel has the title
+            x_axis |= {"anchor": y, "title": {"text": panel.x.label}}
+        y_axis = {"domain": self.rows[row], "anchor": x, **_axis(panel.y), "title": {"text": panel.y.label}}
+        if panel.equal:
+            y_axis["scaleanchor"] = x
         if self.spec.level and beside:
-            self.axes[_long(y)]["matches"] = beside[0]
+            y_axis["matches"] = beside[0]
+        self.axes[_long(y)] = y_axis
         if panel.title:
             corner = {"xanchor": "left", "yanchor": "bottom"}
             self._words(f"{x} domain", f"{y} domain", 0.0, 1.0, f"<b>{panel.title}</b>", **corner)
@@ -254,6 +258,7 @@ class _Drawing:
         return {"name": name or " ", "legendgroup": name, "showlegend": new}
 
     def _draw(self, item: Item, panel: Panel, x: str, y: str) -> None:
+        """Draw an item of a panel with the axes `x` and `y`."""
         place = {"xaxis": x, "yaxis": y}
         match item:
             case Curve():
@@ -277,10 +282,8 @@ class _Drawing:
             case Bars():
                 self._bars(item, panel, place)
             case Label():
-                at_x, at_y = (
-                    float(np.log10(v)) if axis.log else float(v)
-                    for axis, v in ((panel.x, item.x), (panel.y, item.y))
-                )
+                at_x = float(np.log10(item.x)) if panel.x.log else float(item.x)
+                at_y = float(np.log10(item.y)) if panel.y.log else float(item.y)
                 white = {"bgcolor": "rgba(255, 255, 255, 0.8)"}
                 self._words(x, y, at_x, at_y, item.words, **white, **_PLACES[item.place])
             case Field():
@@ -289,10 +292,11 @@ class _Drawing:
                 self._hatch(item, place)
 
     def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
+        """Draw a curve; long ones are thinned."""
         samples = self.samples[id(curve.x)] if curve.has_line and not curve.marker else slice(None)
         look = look_of(curve.look)
         mode = "+".join(
-            name for name, there in (("lines", curve.has_line), ("markers", curve.marker)) if there
+            name for name, is_shown in (("lines", curve.has_line), ("markers", curve.marker)) if is_shown
         )
         symbol, edge = _MARKERS.get(curve.marker, "circle"), {"width": 1.4, "color": look["color"]}
         self._trace(
@@ -314,6 +318,7 @@ class _Drawing:
             self._trace("scatter", x=[None], y=[None], **style, **legend, **place)
 
     def _mark(self, mark: Mark, place: dict[str, Any]) -> None:
+        """Draw a line across a panel, with its words."""
         x, y = place["xaxis"], place["yaxis"]
         look = look_of(mark.look)
         style = {"color": look["color"], "width": look["linewidth"], "dash": _dash(look["linestyle"])}
@@ -324,6 +329,7 @@ class _Drawing:
         self._sample(mark.name, place, mode="lines", line=style)
 
     def _bars(self, bars: Bars, panel: Panel, place: dict[str, Any]) -> None:
+        """Draw horizontal bars."""
         look = BARS[bars.look % len(BARS)]
         pattern = {"shape": look["pattern"], "fgcolor": "#666666", "size": 6} if not bars.slim else {}
         colour = INK if bars.slim else look["color"]
@@ -337,6 +343,7 @@ class _Drawing:
         )  # fmt: skip
 
     def _field(self, field: Field, place: dict[str, Any]) -> None:
+        """Draw a map of classes, with a line around the bold level."""
         count, z = len(field.names), _small(classes(field))
         shades = [[i / max(1, count - 1), colour] for i, colour in enumerate(class_colours(count))]
         common = {"x": _small(field.x), "y": _small(field.y), "z": z, "showscale": False, "hoverinfo": "skip"}
@@ -392,8 +399,8 @@ def _hover(axis: Axis) -> str:
 
 def classes(field: Field) -> Any:
     """The values of a map on a scale on which its levels are 0, 1, 2, .."""
-    inside = np.interp(field.z, field.levels, np.arange(len(field.levels), dtype=float))
-    return np.where(np.isfinite(field.z), inside, np.nan)
+    place = np.interp(field.z, field.levels, np.arange(len(field.levels), dtype=float))
+    return np.where(np.isfinite(field.z), place, np.nan)
 
 
 def _long(axis: str) -> str:

@@ -76,18 +76,19 @@ class _PrintedPage(Page):
 
     def blocks(self, blocks: Sequence[b.Block]) -> str:
         """Blocks in order, with capitals where a line begins; consecutive warnings form one list, and of consecutive
-        figures the narrow ones stand in two columns after the others."""
+        figures the narrow ones stand in two columns after those with panels beside each other."""
         parts = []
-        for kind, together in groupby(blocks, group_of):
-            group = list(together)
-            wide = [block for block in group if kind != FIGURES or _is_wide(block)]
+        for kind, neighbours in groupby(blocks, group_of):
+            group, narrow = list(neighbours), list[Figure]()
             if kind == FIGURES:
+                figures = [block for block in group if isinstance(block, Figure)]
+                narrow = [figure for figure in figures if len(figure.panels[0]) == 1]
                 # the flattest first: it fits on the page that has begun
-                wide.sort(key=self._height)
-            texts = list(filter(None, map(self.block, wide)))
+                group = [*sorted((figure for figure in figures if figure not in narrow), key=self._height)]
+            texts = list(filter(None, map(self.block, group)))
             parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == WARNINGS and texts else texts
-            if narrow := "".join(self.block(block) for block in group if block not in wide):
-                parts.append(f'<div class="prints">{narrow}</div>')
+            if prints := "".join(map(self.block, narrow)):
+                parts.append(f'<div class="prints">{prints}</div>')
         return _BEGIN.sub(lambda match: match[1] + match[2].upper(), "\n".join(parts))
 
     def _value(self, value: b.GivenValue) -> str:
@@ -117,6 +118,7 @@ class _PrintedPage(Page):
             return float(picture.height / picture.width)
 
     def _printed(self, figure: Figure) -> str:
+        """A figure as a picture within the page; empty without its file."""
         file = self._pictures.get(figure.file or "")
         if file is None:
             return ""
@@ -130,11 +132,6 @@ class _PrintedPage(Page):
 
 _FLAT = 0.5
 """Height over width below which two figures stand beside each other in a long annex."""
-
-
-def _is_wide(block: b.Block) -> bool:
-    """Whether a figure has panels beside each other."""
-    return isinstance(block, Figure) and len(block.panels[0]) > 1
 
 
 def _without_bars(row: b.TableRow) -> b.TableRow:

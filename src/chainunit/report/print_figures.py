@@ -75,6 +75,7 @@ def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
 
 
 def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
+    """The figure drawn by matplotlib, `size` times as large as usual."""
     figure = in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.row_heights, figure.column_widths
@@ -141,16 +142,17 @@ def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
 
 
 def _scale(axis: Any, spec: Axis, side: str) -> None:
-    which = getattr(axis, f"{side}axis")
+    """Set scale, range and ticks of one side ("x" or "y") of the axes of a panel."""
+    matplotlib_axis = getattr(axis, f"{side}axis")
     if spec.names:
-        which.set_ticks(range(len(spec.names)), list(spec.names))
+        matplotlib_axis.set_ticks(range(len(spec.names)), list(spec.names))
         getattr(axis, f"set_{side}lim")(len(spec.names) - 0.45, -0.55)
         axis.grid(axis=side, visible=False)
         return
     if spec.log:
         getattr(axis, f"set_{side}scale")("log")
-        which.set_major_formatter(lambda v, _: f"{v:g}")
-        which.set_minor_formatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else "")
+        matplotlib_axis.set_major_formatter(lambda v, _: f"{v:g}")
+        matplotlib_axis.set_minor_formatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else "")
     else:
         axis.ticklabel_format(axis=side, useOffset=False)
     if spec.low is not None or spec.high is not None:
@@ -161,9 +163,9 @@ def _scale(axis: Any, spec: Axis, side: str) -> None:
             # a curve that hardly changes is not on the edge
             getattr(axis, f"set_{side}lim")(low, max(high, largest + _ROOM * (largest - low)))
     if spec.ticks:
-        which.set_ticks(list(spec.ticks))
+        matplotlib_axis.set_ticks(list(spec.ticks))
     elif spec.step is not None and spec.low is not None and spec.high is not None:
-        which.set_ticks(np.arange(spec.low, spec.high + 0.5 * spec.step, spec.step))
+        matplotlib_axis.set_ticks(np.arange(spec.low, spec.high + 0.5 * spec.step, spec.step))
 
 
 def _name(axis: Any, name: str) -> str | None:
@@ -172,6 +174,7 @@ def _name(axis: Any, name: str) -> str | None:
 
 
 def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
+    """Draw an item of a panel."""
     match item:
         case Curve():
             look = look_of(item.look) | ({} if item.has_line else {"linestyle": ""})
@@ -211,6 +214,7 @@ def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
 
 
 def _bars(axis: Any, bars: Bars, size: float) -> None:
+    """Draw horizontal bars."""
     look = BARS[bars.look % len(BARS)]
     lying = axis.barh(
         bars.at, bars.size, bars.height, label=bars.name or None, edgecolor=INK, linewidth=0.6,
@@ -223,6 +227,7 @@ def _bars(axis: Any, bars: Bars, size: float) -> None:
 
 
 def _field(axis: Any, field: Field) -> None:
+    """Draw a map of classes, with a line around the bold level."""
     shades = class_colours(len(field.names))
     z = np.ma.masked_invalid(classes(field))
     axis.contourf(field.x, field.y, z, levels=range(len(field.levels)), colors=shades)

@@ -21,7 +21,7 @@ from ..models import MODELS
 from ..reading.results import documented, results_in
 from ..reading.text import number
 from ..study.analyses import all_analyses
-from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
+from ..study.keys import KeyTable, catalogue_columns, key_tables
 from ..study.remark import SEVERITIES
 from ..study.remarks import declared_remarks
 from .blocks import Block, Column, Report, Section, Table, TableRow, Text, heads
@@ -43,17 +43,11 @@ def overview() -> Report:
 def _contents(tables: Iterable[KeyTable], head: str = "table") -> Table:
     """A row for each table: its heading, or with another `head` the command that shows it; its title; its number of
     keys."""
-    rows = tuple(
-        TableRow(
-            (
-                table.heading if head == "table" else f"chainunit keys {_kind(table)}",
-                table.title,
-                str(len(table.keys)),
-            )
-        )
-        for table in tables
-    )
-    return Table(rows, heads(head, "contents", "keys"), numeric=False)
+    rows = []
+    for table in tables:
+        name = table.heading if head == "table" else f"chainunit keys {_kind(table)}"
+        rows.append(TableRow((name, table.title, str(len(table.keys)))))
+    return Table(tuple(rows), heads(head, "contents", "keys"), numeric=False)
 
 
 def _kind(table: KeyTable) -> str:
@@ -113,11 +107,11 @@ def _block(table: KeyTable, title: str = "") -> Table:
 
 def _key_rows(table: KeyTable) -> tuple[tuple[TableRow, ...], tuple[Column, ...]]:
     """A row for each key of a table, and the heads of the columns."""
-    return tuple(map(_row, table.keys)), _KEY_COLUMNS
-
-
-def _row(key: Key) -> TableRow:
-    return TableRow((key.name, key.left_out or key.follows or "-", key.allowed or "-", key.description))
+    rows = []
+    for key in table.keys:
+        left_out = key.left_out or key.follows or "-"
+        rows.append(TableRow((key.name, left_out, key.allowed or "-", key.description)))
+    return tuple(rows), _KEY_COLUMNS
 
 
 def reference(
@@ -182,18 +176,12 @@ def _remarks() -> Iterator[Block]:
     """A row for each declared remark."""
     meanings = "; ".join(f"{severity}: {meaning}" for severity, meaning in SEVERITIES.items())
     yield Text(f"By their code in result.json, the gravest first. {meanings}.")
-    rows = (
-        TableRow(
-            (
-                remark.code,
-                remark.severity,
-                _ADDED.sub("", of_driver(" ".join(remark.sentences))),
-                _ADDED.sub("", of_driver(remark.remedy)) or "-",
-                ", ".join(f"{name} [{size.unit}]" for name, size in remark.sizes.items()) or "-",
-            )
-        )
-        for remark in declared_remarks()
-    )
+    rows = []
+    for remark in declared_remarks():
+        text = _ADDED.sub("", of_driver(" ".join(remark.sentences)))
+        remedy = _ADDED.sub("", of_driver(remark.remedy)) or "-"
+        numbers = ", ".join(f"{name} [{size.unit}]" for name, size in remark.sizes.items()) or "-"
+        rows.append(TableRow((remark.code, remark.severity, text, remedy, numbers)))
     yield Table(tuple(rows), heads("code", "severity", "sentences", "remedy", "numbers"), numeric=False)
 
 
@@ -204,10 +192,8 @@ def _variables(model: Model) -> Iterator[Block]:
     for causality in ("parameter", "input", "output"):
         for signal in interface.signals_of(causality):
             v = signal.variable
-            start, unit = (
-                f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}",
-                unit_behind(v.unit).strip() or "1",
-            )
+            start = f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}"
+            unit = unit_behind(v.unit).strip() or "1"
             if v.type != "Real":
                 start, unit = written(v.quantity.start or 0.0, v.type), v.type
             allowed = v.quantity.allowed_range if causality != "output" else "-"

@@ -144,11 +144,12 @@ class ReportedResult(Generic[Question, Outcome]):
                 task.clear(place)
             elif place.resolve() != self._folder.resolve():
                 task.clear(place)
-                for kept in task.kept(self._outcome, self._folder):
-                    _copy(kept, place / kept.relative_to(self._folder))
+                for file in task.kept(self._outcome, self._folder):
+                    _copy(file, place / file.relative_to(self._folder))
             return self._write(place, png)
 
     def _write(self, folder: Path, png: bool = False) -> list[Path]:
+        """Write all files into a folder, and return them."""
         paths, failure = self._task.write(self._question, self._outcome, self._report, folder, png)
         if failure is not None:
             raise WriteError(str(failure)) from failure
@@ -217,6 +218,7 @@ class ResultFigure:
         return path
 
     def _bytes(self, kind: str) -> bytes:
+        """The figure as a file of this kind: png, svg or pdf."""
         out = io.BytesIO()
         # without the date the same figure is the same file
         metadata = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]

@@ -46,8 +46,8 @@ def _begin(runs: StudyRuns, run: str, answers: Answers, phase: Phase) -> Iterato
     title, x = runs.title_of(run), numbers(cited(answers, f"runs.{run}"))
     sizes = [(v.described(runs.drive.driver_noun), x[v.name]) for v in measures_of(phase)]
     rows = [row for row in sizes if row[1].value is not None]
-    said = join((line(f"{description} ", size) for description, size in rows), "; ")
-    yield b.Text(line(f"{capital(title)}: ", said, "."), form="short")
+    numbers_read = join((line(f"{description} ", size) for description, size in rows), "; ")
+    yield b.Text(line(f"{capital(title)}: ", numbers_read, "."), form="short")
     end = f", and of the end of the start-up, from {100.0 * STARTED:g} % of the speed on"
     head = f"Demands of the {title} on the drive{end if phase is Phase.SETTLING else ''}"
     yield b.Table(tuple(map(b.TableRow, rows)), title=head, form="long")
@@ -80,17 +80,15 @@ def table_of_runs(study: StudyRecord) -> b.Table:
     """The table of all answers, with a column for each run."""
     setup, runs, answers = study.setup, study.runs, study.runs.answers
     names, unknown_names = by_side(runs, answers), runs.not_known
-    rows = (
-        b.TableRow(
-            (v.described(setup.driver_noun), *(number(runs, run, v.name) for run in names)),
-            form="long" if MEASURES[v.name].minor else "both",
-        )
-        for v in Layout(Answers).variables
+    rows = []
+    for v in Layout(Answers).variables:
+        has_value = any(finite(getattr(answers[run], v.name)) is not None for run in names)
+        is_recovery = v.name == "recovery_time" and runs.returns and runs.overloads
         # a coupling that is absent or stayed shut has no row; an answer that the motor does not give has dashes
-        if v.name in unknown_names
-        or any(finite(getattr(answers[run], v.name)) is not None for run in names)
-        or (v.name == "recovery_time" and runs.returns and runs.overloads)
-    )
+        if has_value or is_recovery or v.name in unknown_names:
+            numbers = (number(runs, run, v.name) for run in names)
+            form: b.Form = "long" if MEASURES[v.name].minor else "both"
+            rows.append(b.TableRow((v.described(setup.driver_noun), *numbers), form=form))
     head: Line = ()
     if "steady" in answers:
         head = line(setup.driver_noun, " at ", number(runs, "steady", "speed_mean"))
@@ -105,10 +103,11 @@ def _doubt(setup: StudySetup) -> str:
 
 
 def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
-    """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
+    """Of the table of all runs (`whole`), steady running beside the overload with the largest crank torque, for one
+    screen."""
     runs, setup = study.runs, study.setup
     names = by_side(runs, runs.answers)
-    shown = [run for run in ("steady",) if run in names] or names[:1]
+    shown = ["steady"] if "steady" in names else names[:1]
     peaks = {run: runs.answers[run].crank_torque_peak for run in runs.overloads if run in names}
     title = whole.title
     if peaks:
@@ -117,9 +116,10 @@ def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
         bare = " (without torque limiter)" if is_bare else ""
         worst = f"{run_names.title(runs, shown[-1])}{_doubt(setup)}"
         title = f"Steady running beside the worst overload{bare}: {worst}"
-    places = [0, *(1 + names.index(run) for run in shown)]
-    rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
-    columns = tuple(whole.columns[i] for i in places)
+    # the first column has the descriptions
+    columns_shown = [0, *(1 + names.index(run) for run in shown)]
+    rows = (replace(row, cells=tuple(row.cells[k] for k in columns_shown)) for row in whole.rows)
+    columns = tuple(whole.columns[k] for k in columns_shown)
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
 
 
@@ -145,6 +145,7 @@ def _pins(runs: StudyRuns) -> b.Table:
     sizes = list(next(iter(tables.values())))
 
     def row(pin: str) -> b.TableRow:
+        """The forces of a pin, and the run with its largest peak."""
         worst = hardest_run(runs.pins, pin)
         numbers = (
             Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes

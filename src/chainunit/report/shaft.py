@@ -81,11 +81,11 @@ def _driveline(study: StudyRecord) -> fig.Figure:
         bars = fig.Bars("cycles", middle, [row.count for row in classes], wide, 1)
         cycles = fig.Axis("cycles counted (rainflow)", low=0.0), fig.Axis("range of torque", "N.m", low=0.0)
         below.append(fig.Panel(*cycles, (bars,)))
-    rows = [
-        (*kind[k : k + _BESIDE], *(None for _ in range(k + _BESIDE - len(kind) if k else 0)))
-        for k in range(0, len(above), _BESIDE)
-        for kind in (above, below)
-    ]
+    rows: list[tuple[fig.Panel | None, ...]] = []
+    for k in range(0, len(above), _BESIDE):
+        # below a full row, a row has empty places at its end
+        empty = [None] * (k + _BESIDE - len(above) if k else 0)
+        rows += [(*above[k : k + _BESIDE], *empty), (*below[k : k + _BESIDE], *empty)]
     return fig.Figure(
         "driveline",
         "The torque in the driveline, and its cycles",

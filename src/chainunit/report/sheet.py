@@ -92,6 +92,7 @@ def _speed(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _title_block(setup: StudySetup, report: b.Report) -> dict[str, str]:
+    """The entries of the title block: labels of the file, machine, study file, status."""
     labels: dict[str, Any] = {name: setup.config.file.labels.get(name, "") for name in _LABELS}
     machine = f"{capital(setup.noun)}, {setup.drive.machine.model.name}"
     return {
@@ -118,6 +119,7 @@ def _not_assumed(report_sections: dict[str, b.Section], setup: StudySetup) -> It
     listed: set[tuple[str, Any]] = set()
 
     def is_shown(value: b.GivenValue) -> bool:
+        """Whether a value is used and not assumed; equal default values of events are shown once."""
         if not _is_used(value, setup) or _is_assumed(value, setup):
             return False
         if not value.name.startswith("event.") or value.origin != "declared":
@@ -158,6 +160,7 @@ def _is_used(value: b.GivenValue, setup: StudySetup) -> bool:
 
 
 def _unchecked(study: StudyRecord) -> Iterator[b.Block]:
+    """All that the study did not compute."""
     lines: list[Line] = [sentence for part in capabilities() for sentence in part.unchecked(study)]
     yield b.Text(
         "The following was not computed, and the numbers above say nothing about it:", "lead", "long"

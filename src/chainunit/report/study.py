@@ -74,6 +74,7 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 def _report(
     study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
 ) -> b.Report:
+    """The report of a study with these sections."""
     config, error = study.setup.config, study.findings.failure
     failure = () if error is None else cited(str(error), "failure")
     kind = f"{capital(study.setup.noun)}: forces, torque and overload"
@@ -154,12 +155,8 @@ def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         for part in capabilities()
         for name in part.unused_values(study.setup.config.machine, study.setup.config.plans[part.name])
     ]
-    yield b.Given(
-        tuple(
-            (section.title, tuple(_values(s, study.setup, section, unused_names)))
-            for section in given_sections(study)
-        )
-    )
+    sections = given_sections(study)
+    yield b.Given(tuple((x.title, tuple(_values(s, study.setup, x, unused_names))) for x in sections))
 
 
 def _values(
@@ -211,6 +208,7 @@ def _live(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _basis(study: StudyRecord) -> Iterator[b.Block]:
+    """The basis of the numbers: models, software, and how to read the page."""
     yield from basis(study)
     yield software(study.runs)
     hint = (
@@ -282,6 +280,7 @@ def _certificate(runs: StudyRuns) -> Iterator[b.Block]:
 
 @cache
 def _version(name: str) -> str:
+    """The version of an installed package."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

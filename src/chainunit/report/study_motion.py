@@ -38,17 +38,18 @@ def motion(study: StudyRecord) -> Animation:
     supplements = (part.supplement(drive) for part in capabilities())
     supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(drive))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
-    parts = machine_picture.picture(machine, whole := machine.drive(angles * machine.ratio))
-    loads = _LOADS if machine_picture.has_loads(whole) else ""
-    thin = f"; a thin line is the {', the '.join(parts.paths)}" if parts.paths else ""
+    whole_turn = machine.drive(angles * machine.ratio)
+    picture = machine_picture.picture(machine, whole_turn)
+    loads = _LOADS if machine_picture.has_loads(whole_turn) else ""
+    thin_lines = f"; a thin line is the {', the '.join(picture.paths)}" if picture.paths else ""
     return replace(
-        parts,
-        links=tuple(_links(parts.links, supplement)),
+        picture,
+        links=tuple(_links(picture.links, supplement)),
         runs=tuple(_run(study.runs, name, interval, supplement) for name in run_names.in_order(study.runs)),
         turn=turn,
-        caption=supplement.caption or _CAPTION.format(loads, thin),
+        caption=supplement.caption or _CAPTION.format(loads, thin_lines),
         groups=tuple(dict.fromkeys(supplement.groups.values())),
-        names={**parts.names, **supplement.names},
+        names={**picture.names, **supplement.names},
     )
 
 
@@ -87,6 +88,7 @@ def _run(runs: StudyRuns, name: str, interval: float, supplement: Supplement) ->
     model = drive.machine.model
     time = run["time"].values
     instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
+    # the row of the run at or behind each instant
     part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
     angle, speed = crank_motion(drive, part)
     loads = _loads(drive, part)
@@ -111,14 +113,14 @@ def _run(runs: StudyRuns, name: str, interval: float, supplement: Supplement) ->
     )
     event = run_names.event_time(runs, name)
     return Clip(
-        name,
-        run_names.title(runs, name),
-        part["time"].values - (event or 0.0),
-        {**linkage.places(state.m), **details.joints},
-        readings,
-        (*forces, *machine_picture.load_arrows(state), *details.arrows),
-        details.loads,
-        linkage.blocks(state.m),
-        event is not None,
+        name=name,
+        title=run_names.title(runs, name),
+        time=part["time"].values - (event or 0.0),
+        joints={**linkage.places(state.m), **details.joints},
+        readings=readings,
+        arrows=(*forces, *machine_picture.load_arrows(state), *details.arrows),
+        loads=details.loads,
+        blocks=linkage.blocks(state.m),
+        event=event is not None,
         still=runs.steady_begin if event is None else 0.0,
     )

@@ -54,6 +54,7 @@ def _with_sheet(record: StudyRecord, report: Report, folder: Path, of_report: li
     """The files of a study, and after its page the sheet, with its own pictures."""
 
     def sheet_file() -> list[Path]:
+        """Write the sheet as PDF, with small pictures of the figures."""
         with TemporaryDirectory() as small, atomic_file(folder / pdf.NAME) as part:
             drawn = print_figures.write(report.figures, Path(small), report.units, are_small=True)
             pdf.write(sheet(record, report), {picture.name: picture for picture in drawn}, part)

@@ -139,11 +139,10 @@ class Task(Generic[Question, Outcome]):
         """Write all files, figures as PNG with `png`, and their provenance; of a study also a copy of its file.
         Returns the files, and the first error of a file that could not be written, or None."""
         of_task = self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
-        of_sources = (
-            provenance.writers(question, folder)
-            if isinstance(question, Config)
-            else provenance.writers_without_study(self.sources(question), folder)
-        )
+        if isinstance(question, Config):
+            of_sources = provenance.writers(question, folder)
+        else:
+            of_sources = provenance.writers_without_study(self.sources(question), folder)
         paths: list[Path] = []
         failure = None
         for write in (*of_task, *of_sources):

@@ -33,6 +33,7 @@ def plain_line(line: Line, units: Units = DEFAULT_UNITS) -> str:
 
 
 def _plain(piece: Piece, units: Units) -> str:
+    """A piece of a line as text."""
     match piece:
         case Number():
             digits = piece.digits or (6 if piece.as_given else 3)
@@ -63,7 +64,7 @@ def plain_cell(cell: Cell, units: Units) -> str:
 def show(report: Report, console: Console, *, remarks: bool = True) -> None:
     """Print the short form. `remarks` is false where the remarks were printed before the study ran."""
     title = report.title
-    last: list[str] = []
+    closing: list[str] = []
     for block in report.blocks("short"):
         role = _role(block)
         if isinstance(block, Table):
@@ -72,12 +73,12 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
             _show_table(block, console, report.units)
             title = ""
         elif role in _LAST:
-            last += [_LAST[role] + sentence for sentence in _sentences(block, report.units)]
+            closing += [_LAST[role] + sentence for sentence in _sentences(block, report.units)]
         elif remarks or role != "remark":
             prefix = "Remark: " if role == "remark" else ""
             for sentence in _sentences(block, report.units):
                 console.print(prefix + sentence, soft_wrap=True)
-    for sentence in last:
+    for sentence in closing:
         console.print(sentence, soft_wrap=True)
 
 
@@ -91,15 +92,15 @@ def screen(report: Report, console: Console, rest: str) -> None:
     """Print one screen: judgements and the central blocks as far as there is room, warnings of up to two lines each,
     and where the rest is (`rest`)."""
     blocks = report.screen
-    last = [
+    closing = [
         _LAST[_role(block)] + sentence
         for block in blocks
         if _role(block) in _LAST
         for sentence in _sentences(block, report.units)
     ]
-    warnings = [sentence for sentence in last if sentence.startswith(_LAST["warning"])][:_WARNINGS]
-    if len(last) > len(warnings):
-        rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
+    warnings = [sentence for sentence in closing if sentence.startswith(_LAST["warning"])][:_WARNINGS]
+    if len(closing) > len(warnings):
+        rest = f"Warnings and notes not shown: {len(closing) - len(warnings)}. {rest}"
     most = 2 * (console.width - 1) - _RAGGED
     shown = [_with_units(cut(warning, most)) for warning in warnings]
     end = [_printed(console, partial(console.print, text)).replace(_KEPT, " ") for text in shown]
@@ -162,6 +163,7 @@ def _first_rows(
 
     @cache
     def printed(count: int) -> str:
+        """The first rows of the table as they are printed, and how many are not shown."""
         part = replace(table, rows=table.rows[:count])
         text = _printed(console, partial(_show_table, part, console, units))
         lines = [line.rstrip() for line in text.splitlines()]
@@ -224,6 +226,7 @@ def _role(block: Block) -> str:
 
 
 def _sentences(block: Block, units: Units) -> list[str]:
+    """The sentences of a judgement or a text."""
     if isinstance(block, Judgement):
         return [plain_line(item, units) for item in block.items or (block.line,)]
     return [plain_line(block.line, units)] if isinstance(block, Text) else []

@@ -30,9 +30,8 @@ def pin_loads(drive: Drive, run: Dataset) -> dict[str, dict[str, float | None]]:
         forces = pin_force(drive, run, title)
         table[title] = {"peak": float(np.max(forces)), "rms": math.sqrt(mean(run, forces**2))}
         for kind, p in EXPONENT.items():
-            table[title][f"{kind}_equivalent"] = (
-                mean_load(forces, angles[name], p) if name in angles else None
-            )
+            equivalent = mean_load(forces, angles[name], p) if name in angles else None
+            table[title][f"{kind}_equivalent"] = equivalent
     return table
 
 
@@ -42,9 +41,10 @@ def driver_bearing(drive: Drive) -> str:
     if drive.foreign_machine:
         return ""
     model = drive.simulated_machine.model
-    ((bearing, *_),) = model.topology.groups[0].joints
+    # the driver is the first group, and its bearing the only joint of it
+    ((driver_joint, *_),) = model.topology.groups[0].joints
     titles = {model.joints.get(output): title for title, output in model.pins.items()}
-    return titles.get(bearing, "")
+    return titles.get(driver_joint, "")
 
 
 def pin_force(drive: Drive, run: Dataset, title: str) -> Any:

@@ -239,19 +239,19 @@ class BlockRuns:
     def _from_rest(self, points: Sequence[RunPoint]) -> list[EventRun]:
         """Runs that start from rest, run until they are steady, and then meet their events, at which their clocks
         begin anew."""
-        states, faults, last = self._steadied(points)
+        states, faults, last_turns = self._steadied(points)
         results = [EventRun(fault=fault) for fault in faults]
-        good = [k for k, fault in enumerate(faults) if fault is None]
-        if not good:
+        settled = [k for k, fault in enumerate(faults) if fault is None]
+        if not settled:
             return results
-        points, states = [points[k] for k in good], states[:, good]
-        waits = self._waits(points, states, [last[k] for k in good])
+        points, states = [points[k] for k in settled], states[:, settled]
+        waits = self._waits(points, states, [last_turns[k] for k in settled])
         before = self._run(points, states, 0.0, waits)
         stops = np.array([point.duration for point in points])
-        runs = self._through(points, before.states, 0.0, np.zeros(len(good)), stops, before)
-        for place, (k, run) in enumerate(zip(good, self._event_runs(runs, stops), strict=True)):
+        runs = self._through(points, before.states, 0.0, np.zeros(len(settled)), stops, before)
+        for place, (k, run) in enumerate(zip(settled, self._event_runs(runs, stops), strict=True)):
             fault = _fault(before, place) or run.fault
-            results[k] = replace(run, fault=fault, steady=_turns(points[place], last[k]))
+            results[k] = replace(run, fault=fault, steady=_turns(points[place], last_turns[k]))
         return results
 
     def _run(
@@ -323,28 +323,29 @@ class BlockRuns:
     # -- from rest
 
     def _started(self, points: Sequence[RunPoint]) -> Runs:
-        """The start from rest until running should be steady."""
-        signals, rest, stops = [], [], []
+        """The start from rest until running should be steady. A machine that starts empty settles twice: at its
+        speed, and once the feed has come."""
+        signals, states, stops = [], [], []
         for point in points:
             operation = point.rig.operation
             fed_from = operation.steady_begin if operation.empty_start else None
-            over_time = replace(point.rig, fed_from=fed_from).signals(ramp=True)
-            # the rate of the reference, which a feed-forward takes, is no profile
-            from_rest = {full: x if is_evaluated(x) else 0.0 for full, x in over_time.items()}
-            begin = self._inputs | {full: at_time(x, 0.0) for full, x in from_rest.items()}
-            signals.append(from_rest)
-            rest.append(self.system.start(begin, {name: point.values[name] for name in self._varying}))
+            profiles = replace(point.rig, fed_from=fed_from).signals(ramp=True)
+            # the rate of the speed reference, for a feed-forward, is no profile that the loop evaluates
+            evaluated = {full: x if is_evaluated(x) else 0.0 for full, x in profiles.items()}
+            signals.append(evaluated)
+            inputs = self._inputs | {full: at_time(x, 0.0) for full, x in evaluated.items()}
+            states.append(self.system.start(inputs, {name: point.values[name] for name in self._varying}))
             turns = operation.run.settle_turns * (2.0 if operation.empty_start else 1.0)
             stops.append(operation.ramp_end + turns * operation.turn)
         step = max(stops) / _ROWS_OF_START
-        return self._run(points, np.array(rest, float).T, 0.0, stops, signals, step=step)
+        return self._run(points, np.array(states, float).T, 0.0, stops, signals, step=step)
 
     def _steadied(self, points: Sequence[RunPoint]) -> tuple[Any, list[RunFault | None], dict[int, Dataset]]:
         """The states in steady running, shape (states, points), the faults of the points, and the run of the last
         turns of each point by its place."""
         start = self._started(points)
         states, faults = start.states, [_fault(start, k) for k in range(len(points))]
-        last: dict[int, Dataset] = {}
+        last_turns: dict[int, Dataset] = {}
         waits = {
             k: _Wait(start.end(k), (point.rig.operation.run.turns + 0.1) * point.rig.operation.turn)
             for k, point in enumerate(points)
@@ -356,13 +357,13 @@ class BlockRuns:
             runs = self._run([points[k] for k in waiting], states[:, waiting], 0.0, stops)
             states[:, waiting] = runs.states
             for place, k in enumerate(waiting):
-                faults[k], last[k] = _fault(runs, place), self._series(runs, place)
-                if faults[k] is not None or _settles(points[k], last[k]):
+                faults[k], last_turns[k] = _fault(runs, place), self._series(runs, place)
+                if faults[k] is not None or _settles(points[k], last_turns[k]):
                     del waits[k]
-                elif not waits[k].goes_on(points[k].rig, last[k]):
+                elif not waits[k].goes_on(points[k].rig, last_turns[k]):
                     faults[k] = RunFault(Cause.UNSETTLED)
                     del waits[k]
-        return states, faults, last
+        return states, faults, last_turns
 
     def _waits(self, points: Sequence[RunPoint], states: Any, steady: Sequence[Dataset]) -> list[float]:
         """Time to the event of each point [s]: the points are followed from these `states`, at the ends of their

@@ -117,22 +117,23 @@ def plate_of(designation: str, files: Sequence[Path]) -> CatalogueMotor | None:
 def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:
     """The tables of a file without the refused values; without any event if one of them is refused."""
     # tables on the way to a refused value are copied one by one: a refused value may be nested without end
-    rest = dict(data)
+    tables = dict(data)
     for key in map(_key, faults):
         names = key.split(".")
         if "event" in names:
             names = names[: names.index("event") + 1]
-        inner: Any = rest
+        inner: Any = tables
         while len(names) > 1 and isinstance(inner.get(names[0]), dict):
             name = names.pop(0)
             inner[name] = dict(inner[name])
             inner = inner[name]
         inner.pop(names[0], None)
-    return rest
+    return tables
 
 
 @cache
 def _lists() -> tuple[str, ...]:
+    """The full names of the keys whose values are lists that a key of a fault may point into."""
     return tuple(
         f"{table}.{key}" for table, section in all_sections().items() for key in section.lists.single_keys
     )
@@ -196,6 +197,7 @@ def check_order(values: Mapping[str, Any]) -> Iterator[InputError]:
     """Refusals of limits with no value between them."""
 
     def value(name: str) -> tuple[float, str]:
+        """The value of a key by its full name, and as text with its unit."""
         section, _, key = name.partition(".")
         x, declaration = getattr(values[section], key), type(values[section])
         unit = next(v.unit for v in Layout(declaration).variables if v.name == key)

@@ -45,13 +45,13 @@ def commented(text: str) -> str:
 
 
 def _keys(table: str, types: list[str]) -> Iterator[Key]:
-    """The keys of a table of the file; of an event, those of its type."""
+    """The keys of a table of the file; `types` are the types of its events. The table ``event.2`` has the keys of the
+    second type, and a table of entries with names, as ``bearing.pin``, those of any entry, ``bearing.NAME``."""
     name, _, number = table.partition(".")
-    begins = {
-        table_name: table_name.removesuffix(NAME) if table_name.endswith(f".{NAME}") else f"{table_name}."
-        for table_name in entry_tables()
-    }
-    name = next((table_name for table_name, begin in begins.items() if table.startswith(begin)), name)
+    for entry_table in entry_tables():
+        if table.startswith(entry_table.removesuffix(f".{NAME}") + "."):
+            name = entry_table
+            break
     model = types[int(number) - 1] if name == "event" else _MACHINE
     for key_table in key_tables():
         if key_table.name == name and key_table.of in ("", model):

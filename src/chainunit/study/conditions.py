@@ -43,6 +43,7 @@ def _value(path: str, test: Callable[[Any], bool], form: Schema) -> Condition:
     names = path.split(".")
 
     def holds(data: Mapping[str, Any]) -> bool:
+        """Whether a file fulfils the condition."""
         value: Any = data
         for name in names:
             if not isinstance(value, Mapping) or name not in value:
@@ -51,6 +52,7 @@ def _value(path: str, test: Callable[[Any], bool], form: Schema) -> Condition:
         return test(value)
 
     def schema() -> Schema:
+        """The condition in JSON Schema: each table of the path is required."""
         whole = form
         for name in reversed(names):
             whole = {"type": "object", "required": [name]} | ({"properties": {name: whole}} if whole else {})

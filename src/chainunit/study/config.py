@@ -228,8 +228,7 @@ class Config:
         return self.motor is None or self.plate is not None
 
     def table(self, name: str) -> Any:
-        """The values of a table; None for an optional table that the file does not
-        have."""
+        """The values of a table; None for an optional table that the file does not have."""
         if name in _OF_DRIVE:
             return getattr(self.drive, name)
         return getattr(self, name) if name in _OWN_TABLES else self.values[name]
@@ -528,11 +527,12 @@ def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str,
 
 def _refused_machine(error: InputError, model: MachineModel, parameters: dict[str, float]) -> InputError:
     """The refusal of a machine with these `parameters` of its file: the error, the values at fault that the file
-    leaves out, and the values that would do, if there is one."""
-    names, remedies = error.names if isinstance(error, GeometryError) else (), dict[str, str]()
+    leaves out, and for each value that alone would do it, the allowed ones. Its key is such a value of the file."""
+    names, remedies = tuple[str, ...](), dict[str, str]()
     if isinstance(error, GeometryError):
+        names = error.names
         remedies = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
-    # the value that spoils the machine, and not one whose range that value sets
+    # first the value that spoils the machine, then one whose range that value sets
     key = next((f"machine.{name}" for name in (*remedies, *names) if name in parameters), "machine")
     declared = Layout(model.Parameters).by_name(model.Parameters())
     left_out = [name for name in names if name in declared and name not in parameters]

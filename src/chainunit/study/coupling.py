@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..machines.linkages.structure import Structure
 from ..mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from ..mechanism.sampled_quantities import ROUNDING, roots
 from ..reading.text import number
@@ -62,16 +63,16 @@ class RamForce:
         """Crank angle [rad] and way [m] before the dead centre within which `torque` [N m] stands for more than
         `TIMES` the working force; None where it does at every angle."""
         n, limit = len(self.angle), torque / (TIMES * self.working)
-        before = np.arange(n) * (2.0 * math.pi / n)
-        lever = self.lever(before)
+        angles_before = np.arange(n) * (2.0 * math.pi / n)
+        lever = self.lever(angles_before)
         k = int(np.argmax(lever >= limit))
         if lever[k] < limit:
             return None
         # at the dead centre itself, where k is 0 for a limit of 0, the lever is nothing
         share = (limit - lever[k - 1]) / (lever[k] - lever[k - 1]) if k else 0.0
-        angle = float(before[max(k - 1, 0)] + share * before[1])
-        within = np.append(before[:k], angle)
-        return angle, float(np.trapezoid(self.lever(within), within))
+        angle = float(angles_before[max(k - 1, 0)] + share * angles_before[1])
+        angles = np.append(angles_before[:k], angle)
+        return angle, float(np.trapezoid(self.lever(angles), angles))
 
 
 def rams(study: StudyRecord) -> Iterator[RamForce]:
@@ -82,24 +83,33 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
     if description is None or TurnAnalysis.name not in study.findings.by_analysis:
         return
     turn = TurnFindings.of_study(study.findings).loaded
-    joints = description.structure.joints
-    for name, joint in joints.items():
-        if joint.kind != PRISMATIC or GROUND not in (joint.on[0], joint.by[0]):
-            continue
-        ram = joint.on[0] if joint.by[0] == GROUND else joint.by[0]
-        pin = next((k for k, j in joints.items() if j.kind == REVOLUTE and ram in (j.on[0], j.by[0])), None)
-        if pin is None or any(name == driver.joint for driver in description.structure.drivers):
-            continue
-        guide, pin_force = (
-            attrgetter(description.variable("joint", joint_name))(turn.outputs) for joint_name in (name, pin)
-        )
-        angle = turn.angle
+    angle = turn.angle
+    for ram, *joint_names in _pinned_rams(description.structure):
+        variables = [description.variable("joint", name) for name in joint_names]
+        guide, pin = (attrgetter(variable)(turn.outputs) for variable in variables)
         rate = np.broadcast_to(guide.v, angle.shape) / study.setup.config.run.crank_speed
-        force = np.broadcast_to(_along(guide, pin_force), angle.shape)
+        force = np.broadcast_to(_along(guide, pin), angle.shape)
         dead_centres = _dead_centres(angle, rate)
         if dead_centres and np.max(force) > 0.0:
             worked = max(dead_centres, key=lambda q: _mean_before(angle, force, q))
             yield RamForce(ram, angle, rate, float(np.max(force)), worked)
+
+
+def _pinned_rams(structure: Structure) -> Iterator[tuple[str, str, str]]:
+    """The links that slide on the ground and that a pin moves, each with its guide and its pin; not drivers."""
+    driven = {driver.joint for driver in structure.drivers}
+    for guide, joint in structure.joints.items():
+        links = {joint.on[0], joint.by[0]}
+        if joint.kind != PRISMATIC or GROUND not in links or guide in driven:
+            continue
+        (ram,) = links - {GROUND}
+        pins = (
+            name
+            for name, pin in structure.joints.items()
+            if pin.kind == REVOLUTE and ram in (pin.on[0], pin.by[0])
+        )
+        if pin_name := next(pins, ""):
+            yield ram, guide, pin_name
 
 
 def _along(guide: Any, force: Any) -> Any:

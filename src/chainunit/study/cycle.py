@@ -64,11 +64,11 @@ def needed_inertia(swing: float, speed: float, fluctuation: float, there: float 
 
 def all_on_one(side: SideName, feed: Feed) -> Feed:
     """The feed with which the organ of `side` has the load of both organs."""
-    one, two = getattr(feed, side), getattr(feed, other(side))
-    whole = {load: getattr(one, load) + getattr(two, load) for load in PLACES}
-    for load, place in PLACES.items() if hasattr(one, "across") else ():
-        whole[place] = middle_of(*((getattr(x, load), getattr(x, place)) for x in (one, two)))
-    return without(other(side), replace(feed, **{side: replace(one, **whole)}))
+    organ, opposite = getattr(feed, side), getattr(feed, other(side))
+    whole = {load: getattr(organ, load) + getattr(opposite, load) for load in PLACES}
+    for load, place in PLACES.items() if hasattr(organ, "across") else ():
+        whole[place] = middle_of(*((getattr(x, load), getattr(x, place)) for x in (organ, opposite)))
+    return without(other(side), replace(feed, **{side: replace(organ, **whole)}))
 
 
 def without(side: SideName, feed: Feed) -> Feed:

@@ -93,12 +93,10 @@ def _difference(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
 
 def _extent(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
     """The largest of the first half of the `values` less the least of the second half; NaN without values."""
-    half = len(values) // 2
-    highest, lowest = (
-        np.stack(np.broadcast_arrays(*part)) if half else np.array([np.nan])
-        for part in (values[:half], values[half:])
-    )
-    return np.max(highest, axis=0) - np.min(lowest, axis=0)
+    if not (half := len(values) // 2):
+        return math.nan
+    highest = np.max(np.stack(np.broadcast_arrays(*values[:half])), axis=0)
+    return highest - np.min(np.stack(np.broadcast_arrays(*values[half:])), axis=0)
 
 
 NAMED: Mapping[str, tuple[str, str]] = {
@@ -144,8 +142,8 @@ def cycle_quantity(name: str, model: Model) -> CycleQuantity:
     if reduction == RANGE:
         pair = (Integrand(column, "max"), Integrand(column, "min"))
         return CycleQuantity(name, variable.unit, description, pair, _difference, reduction=reduction)
-    one = (Integrand(column, reduction),)
-    return CycleQuantity(name, variable.unit, description, one, _only, reduction=reduction)
+    single = (Integrand(column, reduction),)
+    return CycleQuantity(name, variable.unit, description, single, _only, reduction=reduction)
 
 
 def _named(name: str, model: Model) -> CycleQuantity:

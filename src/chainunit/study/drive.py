@@ -25,8 +25,7 @@ from .star_start import NO_STAR, StarStart
 
 
 class AbsentError(InputError):
-    """A quantity that this motor or machine does not have; `part` is the name of motor or machine in the
-    system."""
+    """A quantity that this motor or machine does not have; `part` is the name of motor or machine in the system."""
 
     def __init__(self, part: str, text: str) -> None:
         super().__init__(text)
@@ -140,14 +139,16 @@ class Drive:
 
     @cached_property
     def fmu_parameters(self) -> Any:
-        """Parameters of the motor's FMU: the parameters of the motor, with gear and the flywheel on its shaft in the
-        rotor."""
-        p = self.parameters
-        gear, slips = self.gear_at_rotor, self.line.before_gear is not None
+        """Parameters of the motor's FMU: those of the motor, whose rotor has also the flywheel on its shaft and a
+        gear that turns with it, with the loss of that gear."""
+        p, gear = self.parameters, self.gear_at_rotor
         if self.inertia_on_rotor or gear.J or gear.d:
             J = p.rotor.J + gear.J + self.inertia_on_rotor
             p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + gear.d))
-        return replace(p, gear=replace(p.gear, loss=gear.loss)) if gear.loss or slips else p
+        # a gear behind a part that slips has its loss in the line, and none here
+        if gear.loss or self.line.before_gear is not None:
+            p = replace(p, gear=replace(p.gear, loss=gear.loss))
+        return p
 
     @property
     def gear_at_rotor(self) -> TurningGear:

@@ -62,6 +62,7 @@ def read_events(tables: Sequence[Any], machine: MachineModel | None = None) -> d
     faults = Faults()
 
     def read(entry: Entry, number: int) -> None:
+        """Add the event of a table, with its side and its input, or the faults of the table."""
         event_type = _type(entry)
         entry.title += f" ({event_type.kind})"
         input_name, side = _input(event_type, entry), _side(event_type, entry)
@@ -276,10 +277,9 @@ def _form(declared: type) -> type[BaseModel]:
 
 
 def _parameters(event_type: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
-    """The quantities of an event. A refusal begins with `prefix`, and its key with `place` or, without it,
-    with `prefix`."""
+    """The quantities of an event by its `table` in a file. A refusal begins with `prefix`, and its key with `place`
+    or, without it, with `prefix`."""
+    declared = event_type.Parameters
     quantities = {name: x for name, x in table.items() if name not in _TEXTS}
     with each_refusal(lambda fault: InputError(f"{prefix}{fault}", (place or prefix) + fault.key)):
-        return instance(
-            event_type.Parameters, given_values(read_table(_form(event_type.Parameters), quantities))
-        )
+        return instance(declared, given_values(read_table(_form(declared), quantities)))

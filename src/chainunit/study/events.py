@@ -51,6 +51,7 @@ class _Pulses(Event):
         return {name: self._pulses(begin, normal[name], normal[name] + self._height(normal[name]))}
 
     def _pulses(self, begin: float, usual: float, height: float) -> Profile:
+        """The pulses of the event, from a `usual` value to the `height` and back."""
         p, changes = self.p, list[tuple[float, float, float]]()
         for pulse in self._begins(begin):
             changes += _spell(usual, height, pulse, p.rise, p.rise + p.duration).changes
@@ -84,12 +85,13 @@ class Jam(_Pulses):
         return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width"
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
-        """The pulses, and the place of the whole force across the width."""
-        signals, name = super().signals(normal, begin, state), f"{self.side}.force_across"
-        if name in normal:
-            usual = normal[self.inputs[0]], normal[name]
-            together = middle_of(usual, (self.p.force, self.p.across))
-            signals[name] = self._pulses(begin, normal[name], together)
+        """The pulses of the force, and for a machine with a width those of its place: while the lump adds its force
+        to that of normal running, the place is the middle of both."""
+        signals, place_name = super().signals(normal, begin, state), f"{self.side}.force_across"
+        if place_name in normal:
+            usual_force, usual_place = normal[self.inputs[0]], normal[place_name]
+            middle = middle_of((usual_force, usual_place), (self.p.force, self.p.across))
+            signals[place_name] = self._pulses(begin, usual_place, middle)
         return signals
 
 
@@ -172,16 +174,18 @@ class OneSidedFeed(Event):
         return bool(self.p.share == 1.0)
 
     def ends(self, normal: Mapping[str, float]) -> dict[str, float]:
-        """The inputs of both sides after the feed has moved."""
-        ends, share = {}, self.p.share
-        for load in PLACES:
-            here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
-            ends[there] = (1.0 - share) * normal[there]
-            ends[here] = normal[here] + share * normal[there]
-            name, from_name = (filled(f"{{{side}}}.{PLACES[load]}", self.side) for side in ("side", "other"))
-            if name in normal:
-                moved = share * normal[there], normal[from_name]
-                ends[name] = middle_of((normal[here], normal[name]), moved)
+        """The inputs of both sides after a share of each load has moved to the side of the event; on a machine with a
+        width, the load there lies in the middle of both."""
+        ends, share, opposite = {}, self.p.share, filled("{other}", self.side)
+        for load, place_name in PLACES.items():
+            load_here, load_there = f"{self.side}.{load}", f"{opposite}.{load}"
+            place_here, place_there = f"{self.side}.{place_name}", f"{opposite}.{place_name}"
+            moved = share * normal[load_there]
+            ends[load_there] = (1.0 - share) * normal[load_there]
+            ends[load_here] = normal[load_here] + moved
+            if place_here in normal:
+                present = normal[load_here], normal[place_here]
+                ends[place_here] = middle_of(present, (moved, normal[place_there]))
         return ends
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
@@ -211,8 +215,7 @@ class LoadedStart(OneSidedFeed):
 
     @declaration
     class Parameters(FeedShare):
-        """Quantities of the feed in the start. The start begins at rest and is followed as long as the
-        start-up."""
+        """Quantities of the feed in the start. The start begins at rest and is followed as long as the start-up."""
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The feed on one side from rest on."""
@@ -402,9 +405,9 @@ class Surge(_Pulses):
     def fault(self, normal: Values) -> str:
         """Why the event cannot act on the input; empty where it can."""
         name = self.input
-        return (
-            "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
-        )
+        if normal[name]:
+            return ""
+        return f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
 
     def _height(self, usual: float) -> Any:
         return (self.p.factor - 1.0) * usual

@@ -74,17 +74,17 @@ def _declared(title: str, connectors: Iterable[Connector]) -> type:
     no table of a file can have its name."""
     groups: dict[str, list[Connector]] = {}
     for c in connectors:
-        head, _, rest = c.name.partition(".")
+        head, _, member = c.name.partition(".")
         if head.isidentifier() and not (
             keyword.iskeyword(head) or head[0] == "_" or hasattr(BaseModel, head)
         ):
-            groups.setdefault(head, []).append(replace(c, name=rest))
+            groups.setdefault(head, []).append(replace(c, name=member))
     fields: list[tuple[str, Any, Any]] = []
-    for head, inside in groups.items():
-        if not inside[0].name:
-            fields.append((head, Value, _quantity(inside[0])))
+    for head, members in groups.items():
+        if not members[0].name:
+            fields.append((head, Value, _quantity(members[0])))
         else:
-            group_type = _declared(f"{title}_{head}", [c for c in inside if c.name])
+            group_type = _declared(f"{title}_{head}", [c for c in members if c.name])
             fields.append((head, group_type, group(group_type, head, default=group_type())))
     declared: type = declared_class(title, (), fields)
     return declared

@@ -37,8 +37,7 @@ class GivenSection:
 
     @property
     def place(self) -> str:
-        """Its place in the result; it is under `asked` where the result has other things of the same
-        names."""
+        """Its place in the result; it is under `asked` where the result has other things of the same names."""
         table, _, inner = self.name.partition(".")
         sections = all_sections()
         if table not in sections or not sections[table].apart:
@@ -63,6 +62,7 @@ class GivenSection:
 
 
 def _choice(value: Any) -> Any:
+    """A choice ready for JSON."""
     if isinstance(value, float):
         return entry(value, "1")
     return list(value) if isinstance(value, tuple) else value
@@ -87,6 +87,7 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
 
 
 def _of_study(file: FileContents) -> dict[str, Any]:
+    """The choices of no table, such as the kind of start, that a file of this kind may have."""
     # a key that a file of this kind may not have is not used either
     refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(file.tables)}
     used = all_choices().keys() - refused
@@ -112,17 +113,18 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         values = config.table(name) if placed is None or placed.table is None else placed.table
         if values is None or not section.is_used(study):
             continue
-        prefix = f"{name}."
-        keys = {
-            full.removeprefix(prefix): x for full, x in config.file.choices.items() if full.startswith(prefix)
-        }
-        events = [key for key in section.random_events if keys.pop(key, None) is not None]
+        choices = {}
+        for full, x in config.file.choices.items():
+            table, _, key = full.partition(".")
+            # the findings have the entries of a list of tables, and random events are sections of their own
+            if table == name and x and key not in {*section.lists.entries, *section.random_events}:
+                choices[key] = x
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.file.given else ())
-        # the findings have the entries of a list of tables
-        choices = {key: x for key, x in keys.items() if x and key not in section.lists.entries}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
-        for key in events:
+        for key in (
+            key for key in section.random_events if config.file.choices.get(f"{name}.{key}") is not None
+        ):
             random = randoms[f"{name}.{key}"]
             side = {"side": random.side} if random.side else {}
             title = f"Overload at random: {random.heading}"

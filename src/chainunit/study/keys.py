@@ -165,7 +165,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),
         *(
-            KeyTable("event", _first_sentence(event_type), tuple(_of_event(event_type)), name)
+            KeyTable("event", (event_type.__doc__ or "").split(".")[0], tuple(_of_event(event_type)), name)
             for name, event_type in TYPES.items()
         ),
     )
@@ -278,12 +278,12 @@ def _of_system() -> Iterator[Key]:
         elif name == "motor_parameters":
             yield from _of_fields({name: (dict[str, Any], field)})
         else:
-            inner: Any = field.annotation
-            for key, below in inner.model_fields.items():
-                named = isinstance(below.annotation, type) and hasattr(below.annotation, "model_fields")
-                for member in below.annotation.model_fields if named else ("",):
-                    full = f"{key}.{member}" if member else key
-                    yield Key(f"{name}.{full}", f"name of {full} in the FMU", sort="text")
+            # names of variables in an FMU, some of them in a table of their own
+            names: Any = field.annotation
+            for key, entry in names.model_fields.items():
+                members = getattr(entry.annotation, "model_fields", None)
+                for variable in [key] if members is None else [f"{key}.{member}" for member in members]:
+                    yield Key(f"{name}.{variable}", f"name of {variable} in the FMU", sort="text")
 
 
 def _of_report() -> Iterator[Key]:
@@ -357,7 +357,3 @@ def _choices(annotation: Any) -> tuple[str, ...]:
     if typing.get_origin(annotation) is typing.Literal:
         return tuple(f'"{word}"' for word in typing.get_args(annotation))
     return ("true", "false") if annotation is bool else ()
-
-
-def _first_sentence(cls: type) -> str:
-    return (cls.__doc__ or "").split(".")[0]

@@ -167,8 +167,8 @@ def _at_equilibrium(model: Model, start: Mapping[str, float], operating_point: s
         )
     number, equilibrium = equilibrium_point(inverse, start, operating_point)
     phi = equilibrium.place * float(start.get("ratio", inverse.Parameters().ratio))
-    rest = {"phi_start": phi, "w_start": 0.0} if model is not inverse else {"phi": phi, "w": 0.0}
-    point = _at_values(model, {**start, **rest}, {"tau": 0.0} if model is not inverse else None)
+    at_rest = {"phi_start": phi, "w_start": 0.0} if model is not inverse else {"phi": phi, "w": 0.0}
+    point = _at_values(model, {**start, **at_rest}, {"tau": 0.0} if model is not inverse else None)
     return point._replace(words=f"equilibrium {number} ({place_words(inverse, equilibrium)})")
 
 
@@ -273,12 +273,12 @@ def _point_of_study(
     progress(f"run to {run.replace('_', ' ')}")
     simulation = _simulation_at(rig, run, config.events.get(run), time)
     assert system.model.state_layout is not None
-    now = float(simulation.time)
-    inputs = system.inputs | {full: float(at_time(x, now)) for full, x in simulation.signals.items()}
+    time = float(simulation.time)
+    inputs = system.inputs | {full: float(at_time(x, time)) for full, x in simulation.signals.items()}
     states = dict(zip(system.model.state_layout.names, map(float, simulation.states), strict=True))
     for group in (inputs, states):
         group |= {name: x for name, x in point_values.items() if name in group}
-    text = f"{'steady running' if run == STEADY else run}, t = {now:.6g} s"
+    text = f"{'steady running' if run == STEADY else run}, t = {time:.6g} s"
     words = ", ".join(filter(None, (text, _in_words(system.model, point_values))))
     return LinearPoint(system.model, system.p, inputs, states, words, config.title)
 
@@ -360,6 +360,7 @@ def _run_to(simulation: Any, rig: Rig, time: float) -> Any:
 
 
 def _refuse_opened(simulation: Any, time: float) -> None:
+    """Refuse a point that a run does not reach, as the torque limiter ends it before."""
     if simulation.time < time * (1.0 - 1e-9) - 1e-9:
         raise RunError(
             f"the torque limiter opens at t = {simulation.time:.4g} s, before the point at {time:.4g} s; take an "

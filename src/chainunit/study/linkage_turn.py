@@ -180,11 +180,11 @@ class _Way:
 
     def outputs(self, names: Iterable[str]) -> Callable[[Any], Any]:
         """The function that gives outputs at places, shape (names, n)."""
-        kept = tuple(names)
+        variables = tuple(names)
 
         def values(q: Any) -> Any:
             outputs = self.state(q)[1]
-            return np.array([outputs[name] for name in kept]).reshape(-1, len(q))
+            return np.array([outputs[name] for name in variables]).reshape(-1, len(q))
 
         return values
 
@@ -214,10 +214,11 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
     for driver_speed in {speed} if machine.model.turns else {abs(speed), -abs(speed)}:
         description.check_loads(machine.p, driver_speed)
-    rest = machine.equilibria()
+    equilibria = machine.equilibria()
     if machine.model.turns:
-        return _findings(machine, speed, rest)
-    return replace(_findings(machine, abs(speed), rest), back=_findings(machine, -abs(speed), rest))
+        return _findings(machine, speed, equilibria)
+    forth, back = (_findings(machine, sign * abs(speed), equilibria) for sign in (1.0, -1.0))
+    return replace(forth, back=back)
 
 
 def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindings:
@@ -267,6 +268,16 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         energy_gap=float(np.max(gap) / max(np.max(np.abs(torque)), 1e-300)),
     )
     motions = list(_motions(description, way, q))
+    joint_turns = {}
+    for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True):
+        normal = f"{variable}.normal"
+        joint_turns[name] = JointTurn(
+            peak=top[f"force {name}"],
+            peak_at=peak_places[f"force {name}"],
+            rms=force_rms,
+            moment=top.get(f"{variable}.moment"),
+            least=-top[normal] if normal in machine.model.contacts else None,
+        )
     return LinkageFindings(
         machine,
         speed,
@@ -277,16 +288,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
             name: GroupTurn(margin=-top[f"-margin {name}"], margin_at=peak_places[f"-margin {name}"])
             for name in groups
         },
-        joints={
-            name: JointTurn(
-                peak=top[f"force {name}"],
-                peak_at=peak_places[f"force {name}"],
-                rms=force_rms,
-                moment=top.get(f"{variable}.moment"),
-                least=-top[least] if (least := f"{variable}.normal") in machine.model.contacts else None,
-            )
-            for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True)
-        },
+        joints=joint_turns,
         strokes={name: motion for name, motion, _ in motions if isinstance(motion, Stroke)},
         swings={name: motion for name, motion, _ in motions if isinstance(motion, Swing)},
         dead_centres={
@@ -313,6 +315,7 @@ def _means(
     variables, over the way of the driver from the begin to the end of its `span`."""
 
     def squares(q: Any) -> Any:
+        """Effort, its square, and the square of the force of each joint, shape (rows, places)."""
         state, outputs = way.state(q)
         bias = np.broadcast_to(state.bias, q.shape)
         forces = (outputs[f"{joint}.fx"] ** 2 + outputs[f"{joint}.fy"] ** 2 for joint in joints)
@@ -324,37 +327,41 @@ def _means(
     return (0.0 if abs(mean) <= _LOSSLESS * size else float(mean), torque_rms), forces_rms
 
 
+class _MovingPart(NamedTuple):
+    """A joint or link that moves, the class of its motion, and the outputs of its place and its rate."""
+
+    name: str
+    motion: type[Stroke | Swing]
+    place: str
+    rate: str
+
+
 def _motions(
     description: LinkageDescription, way: _Way, q: Any
 ) -> Iterator[tuple[str, Stroke | Swing, list[float]]]:
     """The motion of each sliding joint besides the driver and of each link that swings, each with its name and with
     the places of the driver at which it turns back."""
     structure, turns = description.structure, way.machine.model.turns
-    moving: list[tuple[str, type[Stroke | Swing], str, str, str]] = [
-        (name, Stroke, "s", "v", description.variable("joint", name))
-        for name, joint in structure.joints.items()
-        if joint.kind == PRISMATIC and name != structure.driver.joint
-    ]
-    moving += [
-        (name, Swing, "angle", "w", description.variable("link", name))
-        for name in structure.links
-        if description.link_turns[name][0] == 0.0 or not turns
-    ]
-    parts = [
-        (name, kind, f"{variable}.{place}", f"{variable}.{rate}")
-        for name, kind, place, rate, variable in moving
-    ]
+    parts: list[_MovingPart] = []
+    for name, joint in structure.joints.items():
+        if joint.kind == PRISMATIC and name != structure.driver.joint:
+            variable = description.variable("joint", name)
+            parts.append(_MovingPart(name, Stroke, f"{variable}.s", f"{variable}.v"))
+    for name in structure.links:
+        if description.link_turns[name][0] == 0.0 or not turns:
+            variable = description.variable("link", name)
+            parts.append(_MovingPart(name, Swing, f"{variable}.angle", f"{variable}.w"))
     _, outputs = way.state(q)
-    parts = [part for part in parts if np.ptp(outputs[part[2]]) > STANDS]
-    dead_centres = roots(way.outputs(rate for *_, rate in parts), q, around=turns) if parts else []
-    for (name, motion_type, output, _), back in zip(parts, dead_centres, strict=True):
+    parts = [moving for moving in parts if np.ptp(outputs[moving.place]) > STANDS]
+    dead_centres = roots(way.outputs(moving.rate for moving in parts), q, around=turns) if parts else []
+    for moving, back in zip(parts, dead_centres, strict=True):
         # a driver with a range has ends of its own
         places = back if turns and len(back) else np.array([q[0], *back, q[-1]])
-        course = way.outputs([output])(places)[0]
+        course = way.outputs([moving.place])(places)[0]
         low, high = int(np.argmin(course)), int(np.argmax(course))
         whole = 2.0 * math.pi
         forth = float(places[high] - places[low]) % whole if turns else None
-        motion = motion_type(
+        motion = moving.motion(
             least=_plain(course[low]),
             least_at=_folded(float(places[low]), turns),
             largest=_plain(course[high]),
@@ -363,7 +370,7 @@ def _motions(
             forth=forth,
             time_ratio=max(forth, whole - forth) / min(forth, whole - forth) if forth else None,
         )
-        yield name, motion, sorted(_folded(float(x), turns) for x in back)
+        yield moving.name, motion, sorted(_folded(float(x), turns) for x in back)
 
 
 def _folded(q: float, turns: bool) -> float:
@@ -446,37 +453,31 @@ def linkage_data(
     `remarks` on a drawing."""
     description, unit = f.description, f.machine.model.driver_port.unit
 
-    def limits(variable: str, limit_unit: str) -> InUnit:
-        return InUnit(f.limits[variable], limit_unit)
-
+    angles, points = {}, {}
+    for name, entry in description.structure.links.items():
+        link = description.variable("link", name)
+        angles[name] = InUnit(f.limits[f"{link}.angle"], "rad")
+        for point in entry.points:
+            x, y = f.limits[f"{link}.{point}.x"], f.limits[f"{link}.{point}.y"]
+            points[f"{name}.{point}"] = {"x": InUnit(x, "m"), "y": InUnit(y, "m")}
     return LinkageData(
-        __version__,
-        source,
-        f.machine.model.description,
-        f.sentence,
-        1 + len(description.further.free),
-        InUnit(f.speed, unit("rad/s")),
-        WayForces(f.turn, f.joints),
-        f.groups,
-        f.strokes,
-        f.swings,
-        {name: InUnit(places, unit("rad")) for name, places in f.dead_centres.items()},
-        {
-            link: limits(f"{description.variable('link', link)}.angle", "rad")
-            for link in description.structure.links
-        },
-        {
-            f"{link}.{point}": {
-                axis: limits(f"{description.variable('link', link)}.{point}.{axis}", "m")
-                for axis in ("x", "y")
-            }
-            for link, entry in description.structure.links.items()
-            for point in entry.points
-        },
-        {"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
-        _at_rest(f),
-        WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
-        {
+        chainunit=__version__,
+        source=source,
+        title=f.machine.model.description,
+        sentence=f.sentence,
+        degrees_of_freedom=1 + len(description.further.free),
+        speed=InUnit(f.speed, unit("rad/s")),
+        forces=WayForces(f.turn, f.joints),
+        groups=f.groups,
+        strokes=f.strokes,
+        swings=f.swings,
+        dead_centres={name: InUnit(places, unit("rad")) for name, places in f.dead_centres.items()},
+        angles=angles,
+        points=points,
+        over_the_way={"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
+        rest=_at_rest(f),
+        back=WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
+        drivers={
             name: {
                 "peak": InUnit(turn.peak, "N" if turn.linear else "N.m"),
                 "power_mean": InUnit(turn.power_mean, "W"),
@@ -484,9 +485,9 @@ def linkage_data(
             for name, turn in f.drivers.items()
         }
         or None,
-        [*remarks],
-        [str(value) for value in slips_of(tuple(unusual))],
-        [value.sentence for value in unusual if value.with_unit],
+        drawn=[*remarks],
+        slips=[str(value) for value in slips_of(tuple(unusual))],
+        notes=[value.sentence for value in unusual if value.with_unit],
     )
 
 

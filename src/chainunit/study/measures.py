@@ -92,8 +92,9 @@ def _recovery(w: Window) -> float | None:
 
 
 def _relay(w: Window) -> float | None:
-    """Time after the event at which the slowest thermal relay of the class of the study trips, set to the rated
-    current of the motor. None after the coupling opened, as no load is left that could trip the relay."""
+    """Time after the event [s] at which the slowest thermal relay of the class of the study trips, set to the rated
+    current of the motor; None where it does not, or no rated current is known. None, too, after the coupling opened,
+    as no load is left that could trip the relay."""
     setting = w.drive.rated_current
     if setting is None or w.trip is not None:
         return None
@@ -101,9 +102,10 @@ def _relay(w: Window) -> float | None:
     current = w.value(w.current)
     if w.phase is Phase.LOADED_START:
         current = w.drive.star.winding_current(w.since, current)
-    before = w.steady.rms(w.current)
-    lasts = lasting_current(current, before if w.passes and _stall(w) is None else None)
-    return relay_trip(w.since, current, setting, before, lasts, w.relay_class)
+    steady_current = w.steady.rms(w.current)
+    # an event that passes, and does not stall the motor, leads back to steady running
+    afterwards = lasting_current(current, steady_current if w.passes and _stall(w) is None else None)
+    return relay_trip(w.since, current, setting, steady_current, afterwards, w.relay_class)
 
 
 def _stall(w: Window) -> float | None:
@@ -124,6 +126,7 @@ def _slack_time(w: Window) -> float | None:
 
 
 def _fold(w: Window) -> float | None:
+    """Largest angle between two rods of a chain [rad]; None without chains."""
     if "machine.left.fold_largest" not in w.run:
         return None
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
@@ -197,8 +200,7 @@ def measure(
     card: bool = False,
     minor: bool = False,
 ) -> Any:
-    """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the
-    `phrase`."""
+    """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the `phrase`."""
     own_field = quantity(unit, f"{of}, {phrase}" if of else phrase, kind=kind)
     declared = Measure(reader, during, phrase, of or phrase, card, minor)
     return dataclasses.field(metadata={**own_field.metadata, "measure": declared})
@@ -208,8 +210,7 @@ def measure(
 class Answers:
     """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the motor's. Means
     and RMS of steady running are over the time of whole turns of the crank, the turns in `load_cycle.csv`; those of
-    an event are over all the time that it is followed, as its peaks are.
-    Times count from the event.
+    an event are over all the time that it is followed, as its peaks are. Times count from the event.
 
     - ripple: (largest - least)/mean of the speed
     - `power_peak`: the largest power that the motor gives, 0 where it only brakes

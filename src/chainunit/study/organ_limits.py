@@ -131,12 +131,12 @@ def least_pulls(drive: Drive, run: Dataset, sides: tuple[str, ...]) -> dict[RodN
     machine = drive.simulated_machine
     if not sides or not isinstance(machine, ChainUnitMachine):
         return {}
-    left, right = (
+    left_loads, right_loads = (
         SideLoads(**{load: run[f"machine.{side}.{load}"].values for load in Layout(SideLoads).names})
         for side in SIDES
     )
     psi, w, a = (run[f"machine.rocker.{name}"].values for name in ("psi", "w", "a"))
-    pulls = machine.organ_pulls(psi, w, a, left, right)
+    pulls = machine.organ_pulls(psi, w, a, left_loads, right_loads)
     least: dict[RodName, LeastPull] = {}
     for rod in RODS:
         ends = [pulls[side][rod] for side in SIDES if side in sides]

@@ -144,7 +144,8 @@ def is_designation(motor: str) -> bool:
 
 
 def parts_of(data: Mapping[str, Any], source: str) -> Parts:
-    """Machine and motor of a file. They are checked first, as the other tables depend on them.
+    """Machine and motor of a file. They are checked first, as the other tables depend on them. A file that leaves the
+    motor open has the one of its example; a name that is none of a model or an FMU is a designation of a catalogue.
 
     Raises
     ------
@@ -196,8 +197,8 @@ def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineM
         return machine.having(names), ()
     except InputError as error:
         keys = tuple(fault.key for fault in error.faults)
-        left = [name for name in names if not f"{name}.".startswith(tuple(f"{key}." for key in keys))]
-        machine, more = _with_further(machine, left)
+        unread_names = [name for name in names if not f"{name}.".startswith(tuple(f"{key}." for key in keys))]
+        machine, more = _with_further(machine, unread_names)
         return machine, (
             *(InputError(f"machine.{fault}", f"machine.{fault.key}") for fault in error.faults),
             *more,
@@ -266,8 +267,8 @@ def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
             f"machine.linkage = {shown(name)}: system.machine names a machine, too; take one of both out",
             key="machine.linkage",
         )
-    rest = {key: value for key, value in machine.items() if key != "linkage"}
-    return {**data, "system": {**system, "machine": name}, "machine": rest}
+    parameters = {key: value for key, value in machine.items() if key != "linkage"}
+    return {**data, "system": {**system, "machine": name}, "machine": parameters}
 
 
 def example(name: str = "chain-unit") -> str:
@@ -285,8 +286,8 @@ def with_frictions(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Inp
         wrong = (
             f"machine.pins = {shown(machine['pins'])}: must be a table of pins, such as pins.A.friction = 0.1"
         )
-        rest = {name: value for name, value in machine.items() if name != "pins"}
-        return {**data, "machine": rest}, [InputError(wrong, "machine.pins")]
+        parameters = {name: value for name, value in machine.items() if name != "pins"}
+        return {**data, "machine": parameters}, [InputError(wrong, "machine.pins")]
     pins = dict(machine["pins"])
     for name, entry in pins.items():
         if isinstance(entry, Mapping) and "kind" in entry:
@@ -300,8 +301,7 @@ def with_frictions(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Inp
 
 @cache
 def _examples_of_machines() -> dict[str, str]:
-    """By machine, the first example with that machine; a study takes the values that its file leaves out from
-    it."""
+    """By machine, the first example with that machine; a study takes the values that its file leaves out from it."""
     tables = {name: named_table(toml(example(name)), "system") for name in reversed(EXAMPLES)}
     return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 

@@ -111,14 +111,14 @@ def _commit() -> str | None:
     if not (root / ".git").exists() or not (root / "src" / "chainunit").is_dir():
         return None
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        done = subprocess.run(
+        process = subprocess.run(
             ["git", "-C", str(root), "rev-parse", "HEAD"],
             capture_output=True,
             text=True,
             timeout=10,
             check=True,
         )
-        return done.stdout.strip() or None
+        return process.stdout.strip() or None
     return None
 
 

@@ -30,9 +30,8 @@ that repeats itself: then nothing is random, and the interval holds all values."
 
 
 def quantile(values: Any, q: float) -> Estimate | None:
-    """The quantile `q` of independent values, shape (n,), or of runs with several values each, shape (runs,
-    n); its interval is between two of the ordered values. None where the values count as fewer than
-    `runs_needed`."""
+    """The quantile `q` of independent values, shape (n,), or of runs with several values each, shape (runs, n); its
+    interval is between two of the ordered values. None where the values count as fewer than `runs_needed`."""
     from scipy.stats import binom
 
     values = np.asarray(values, float)
@@ -55,10 +54,9 @@ def quantile(values: Any, q: float) -> Estimate | None:
 
 def independent_count(values: Any, q: float) -> int:
     """The number of independent values as which the `values` count at the quantile `q`. All values count if
-    they are of shape (n,), or of several runs, shape (runs, n), that are alike. Otherwise their number is
-    divided by the larger of two design effects: the estimate from the shares of each run above the quantile,
-    and the upper confidence limit from the ranks of all values. The shares alone are too few numbers: by
-    chance they may look independent."""
+    they are of shape (n,), or of runs, shape (runs, n), that are alike; else their number is divided by the larger
+    of two design effects: the estimate from the shares of each run above the quantile, and the upper confidence
+    limit from the ranks of all values. The few shares alone may look independent by chance."""
     values = np.asarray(values, float)
     if values.ndim == 1 or values.shape[1] == 1 or _alike(values):
         return int(values.size)
@@ -66,10 +64,12 @@ def independent_count(values: Any, q: float) -> int:
     if runs == 1:
         return 1
     limit = np.quantile(values, q)
-    # many equal values may be the quantile themselves
+    # the shares of each run, where values that equal the quantile count as below it, and as above it
     shares = [np.mean(above, axis=1) for above in (values > limit, values >= limit)]
-    effect = float(np.max(np.var(shares, axis=1, ddof=1))) * n / (q * (1.0 - q))
-    return int(values.size / max(1.0, effect, 1.0 + (n - 1) * _alikeness(values)))
+    # of independent values, such a share has the variance q (1 - q)/n
+    effect_by_shares = float(np.max(np.var(shares, axis=1, ddof=1))) * n / (q * (1.0 - q))
+    effect_by_ranks = 1.0 + (n - 1) * _alikeness(values)
+    return int(values.size / max(1.0, effect_by_shares, effect_by_ranks))
 
 
 def _alikeness(values: Any) -> float:

@@ -185,11 +185,11 @@ def largest_torque(drive: Drive, run: Dataset, T: float) -> Any:
         # instants that are alike to this resolution are computed once
         unit = resolution * max(peak(x), 1e-9)
         columns.append(np.round(x / unit) * unit)
-    instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
+    instants, place = np.unique(np.stack(columns), axis=1, return_inverse=True)
     limits = [
         drive.motor.largest_torque(drive.fmu_parameters, T, *map(float, instant)) for instant in instants.T
     ]
-    return np.array(limits)[np.reshape(which, -1)]
+    return np.array(limits)[np.reshape(place, -1)]
 
 
 def pull_out_torque(drive: Drive, run: Dataset, T: float) -> float:
@@ -282,10 +282,11 @@ def stored_shares(turns: Dataset, held: Any) -> tuple[float | None, float | None
     # a cut that begins before the last row ends in the turns after it
     time = np.append(time, time[1:] + time[-1] - time[0])
     power, held = (np.append(x, x[1:]) for x in (power, held))
-    net = most = work = 0.0
-    for a, b in stretches(power > 0.01 * np.max(power)):
-        if 0 < a < rows:
-            net += float(held[a] - held[b - 1])
-            most += float(held[a] - np.min(held[a:b]))
-            work += float(np.trapezoid(power[a:b], time[a:b]))
-    return (net / work, most / work) if work > 0.0 else (None, None)
+    given_to_end = given_to_least = work = 0.0
+    for begin, end in stretches(power > 0.01 * np.max(power)):
+        # a stretch at the first row has begun before it, and comes once more
+        if 0 < begin < rows:
+            given_to_end += float(held[begin] - held[end - 1])
+            given_to_least += float(held[begin] - np.min(held[begin:end]))
+            work += float(np.trapezoid(power[begin:end], time[begin:end]))
+    return (given_to_end / work, given_to_least / work) if work > 0.0 else (None, None)

@@ -156,11 +156,11 @@ class StudyRuns:
 
     @property
     def not_known(self) -> frozenset[str]:
-        """Names of the measures of steady running that cannot be read, as the motor is a foreign FMU."""
+        """Names of the measures of steady running that need a variable which the foreign FMU of the motor lacks."""
         if self.drive.foreign is None or STEADY not in self.answers:
             return frozenset()
-        parts = not_known(self.window(Phase.STEADY, self.steady))
-        return frozenset(name for name, part in parts.items() if part == "motor")
+        lacking_parts = not_known(self.window(Phase.STEADY, self.steady))
+        return frozenset(measure for measure, part in lacking_parts.items() if part == "motor")
 
     @property
     def steady(self) -> Dataset:
@@ -256,8 +256,8 @@ class Findings:
 
     @property
     def gear_loss(self) -> float | None:
-        """The mean loss of the gear [W] in its own runs of the study's steady running, with a winding as warm as that
-        makes it; None without such runs."""
+        """The mean loss of the gear [W] in steady running with a warm winding, by an analysis that makes such runs;
+        None for all others."""
         return None
 
     @classmethod

@@ -85,8 +85,9 @@ class RemarkCode:
                 x, size = self._sized(name, value)
                 quantities[name] = InUnit(x, size.unit, size.kind, of_driver(size.title, driver))
                 texts[name] = None if x is None else number(x, size.unit, size.kind, size.digits)
-        said = [_said(of_driver(sentence, driver), texts) for sentence in (*self.sentences, self.remedy)]
-        return Remark(self.code, self.severity, " ".join(filter(None, said)), said[-1], runs, quantities)
+        *sentences, remedy = (_said(of_driver(x, driver), texts) for x in (*self.sentences, self.remedy))
+        text = " ".join(filter(None, (*sentences, remedy)))
+        return Remark(self.code, self.severity, text, remedy, runs, quantities)
 
     def _sized(self, name: str, value: float | Amount) -> tuple[float | None, Size]:
         """The number in a value, and its size: the one that comes with it, or else the declared one of its name."""
@@ -102,8 +103,8 @@ def _said(sentence: str, texts: Mapping[str, str | None]) -> str:
     """The sentence with its values; empty if one of them is None."""
     if any(texts[slot] is None for slot in _SLOT.findall(sentence)):
         return ""
-    said = _SLOT.sub(lambda slot: str(texts[slot[1]]), sentence)
-    return said[:1].upper() + said[1:]
+    text = _SLOT.sub(lambda slot: str(texts[slot[1]]), sentence)
+    return text[:1].upper() + text[1:]
 
 
 DECLARED: dict[str, RemarkCode] = {}

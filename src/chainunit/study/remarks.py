@@ -257,6 +257,7 @@ def _stall_speed(runs: StudyRuns, steady: Answers) -> float | None:
 
 
 def _speed_missed(code: str, why: str, remedy: str = "") -> RemarkCode:
+    """The remark on a crank that misses its speed, with the reason `why`."""
     missed = "In steady running the {driver} turns at {speed_mean} in place of {asked}."
     begin = "The overloads begin from this state{overloads}."
     return fault(code, missed, why, begin, remedy=remedy, sizes={("rad/s", "speed"): "speed_mean"})
@@ -401,26 +402,29 @@ _STANDS_IN_STAR = warning(
 
 
 def _on_star(study: StudyRecord) -> None:
-    """Warn of a motor that stands in star, and of a change from star to delta at too low a speed, in any start."""
-    drive, time, run = study.setup.drive, study.setup.drive.star.time, study.runs.series["start_up"]
-    first = speed_in_star(drive, run)
-    if first is None or study.setup.plate is None:
+    """Warn of a motor that stands in star, and of a change from star to delta at too low a speed, in any start: from
+    the angle 0, which the study runs, and from all others, if they were run. Speeds are shares of the synchronous
+    one at the end of the time in star."""
+    drive, run = study.setup.drive, study.runs.series["start_up"]
+    share_from_0 = speed_in_star(drive, run)
+    if share_from_0 is None or study.setup.plate is None:
         return
     findings, times = StartFindings.found_in(study.findings), run["time"].values
     starts = () if findings is None else findings.starts
-    after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.star.end]
-    delta = float(max([*after, *(start.current for start in starts)], default=0.0))
-    by_angle = {start.angle: start.star_speed for start in starts if start.star_speed is not None}
-    if held := [angle for angle, share in by_angle.items() if share < _STANDING]:
-        angles = ", ".join(number(angle, "rad") for angle in held)
-        where = f"from {len(held)} of {len(starts)} angles ({angles})"
-        least = min((share for angle, share in by_angle.items() if angle not in held), default=None)
+    after_change = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.star.end]
+    delta = float(max([*after_change, *(start.current for start in starts)], default=0.0))
+    shares = {start.angle: start.star_speed for start in starts if start.star_speed is not None}
+    if standing := [angle for angle, share in shares.items() if share < _STANDING]:
+        angles = ", ".join(number(angle, "rad") for angle in standing)
+        where = f"from {len(standing)} of {len(starts)} angles ({angles})"
+        least = min((share for angle, share in shares.items() if angle not in standing), default=None)
         study.findings.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
         return
-    share, angle = min([(first, 0.0), *((share, angle) for angle, share in by_angle.items())])
+    share, angle = min([(share_from_0, 0.0), *((share, angle) for angle, share in shares.items())])
     if times[-1] <= drive.star.end or share >= _LITTLE_STAR:
         return
     if share < FULL_STAR:
+        time = drive.star.time
         study.findings.say(_STAR_TOO_SHORT, START, time=time, share=share, angle=angle, delta=delta)
     else:
         study.findings.say(_STAR_JUST_LONG, START, share=share, angle=angle)

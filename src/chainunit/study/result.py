@@ -119,6 +119,7 @@ def as_dict(study: StudyRecord) -> ResultEntries:
 
 
 def _data(study: StudyRecord) -> StudyData:
+    """The declared content of result.json, but for the parts of analyses and given values."""
     setup, findings, failure = study.setup, study.findings, study.findings.failure
     return StudyData(
         heading=Heading.of(setup.config.title, setup.config.file),
@@ -157,6 +158,7 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
 
 
 def _motor(setup: StudySetup) -> dict[str, Any]:
+    """Kind, title, rating and parameters of the motor, as far as they are known."""
     kind, plate = setup.drive.graph.components["motor"].title, setup.plate
     titles = {"kind": kind, "title": setup.motor_title}
     rating = {} if plate is None else as_data(MotorRating.of(plate))
@@ -175,6 +177,7 @@ def _runs(runs: StudyRuns) -> RunData:
     """The events, and the numbers of each run."""
 
     def begin(phase: Phase, answers: Answers | None) -> dict[str, InUnit] | None:
+        """The measures of a part of the start."""
         if answers is None:
             return None
         return {v.name: InUnit(getattr(answers, v.name), v.unit, v.kind) for v in measures_of(phase)}
@@ -198,13 +201,13 @@ def assumed_ranges(runs: StudyRuns, name: str) -> dict[str, InUnit]:
     """The range of the assumed quantities of an event, and the peaks over it."""
     spread = runs.spreads[name]
     units = {v.name: v.unit for v in variables(runs.events[name].Parameters)}
-    ranges = [(key, ends, units[key], "assumed") for key, ends in spread.ranges.items()]
-    ranges += [(key, ends, "N.m", "") for key, ends in spread.peaks.items()]
-    return {
-        f"{key}_{end}": InUnit(x, unit, kind)
-        for key, ends, unit, kind in ranges
-        for end, x in zip(("low", "high"), ends, strict=True)
-    }
+    data: dict[str, InUnit] = {}
+    for key, (low, high) in spread.ranges.items():
+        data |= {f"{key}_low": InUnit(low, units[key], "assumed")}
+        data |= {f"{key}_high": InUnit(high, units[key], "assumed")}
+    for key, (low, high) in spread.peaks.items():
+        data |= {f"{key}_low": InUnit(low, "N.m"), f"{key}_high": InUnit(high, "N.m")}
+    return data
 
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
@@ -216,6 +219,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:
+    """The data of the shaft line with its torsion, of its shafts in the runs, and of their cycles of torque."""
     shaft = shaft_findings(study.findings)
     largest = max((answers.range_largest for answers in shaft.answers.values()), default=0.0)
     return {

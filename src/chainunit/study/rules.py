@@ -65,12 +65,11 @@ def refusals(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
 
 def machine_is(name: str) -> Condition:
     """Whether the file has this packaged machine, by its name or as it names none."""
-    named = is_one_of("system.machine", name)
-    return (
-        named | ~(given("system.machine") | given("machine.linkage"))
-        if name == _default().machine.name
-        else named
-    )
+    is_named = is_one_of("system.machine", name)
+    if name != _default().machine.name:
+        return is_named
+    names_another = given("system.machine") | given("machine.linkage")
+    return is_named | ~names_another
 
 
 def motor_is(*names: str) -> Condition:

@@ -161,9 +161,9 @@ class Runner:
         operation = rig.operation
         self.stop = operation.stop
         """time to which the start-up is run [s]; later where the motor takes longer to settle"""
-        taken = [event for event in study.runs.events.values() if rig.takes(event)]
-        self.events = [event for event in taken if not event.from_rest]
-        self.starts = [event for event in taken if event.from_rest]
+        events = [event for event in study.runs.events.values() if rig.takes(event)]
+        self.events = [event for event in events if not event.from_rest]
+        self.starts = [event for event in events if event.from_rest]
         self.total = self.stop * (1 + len(self.starts))
         self.total += sum(operation.turn + event.time_followed(operation.turn) for event in self.events)
         self._coasting: Path | None = None
@@ -197,6 +197,8 @@ class Runner:
             self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
 
     def _progress(self, what: str, before: float) -> Progress:
+        """The progress of a run from the time `before` of all runs on [s]."""
+
         def progress(time: float) -> None:
             self.progress(what, min(before + time, self.total), self.total)
 
@@ -256,6 +258,7 @@ class Runner:
             runs.relay_class = max(runs.relay_class, proposal.start_class)
 
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
+        """Follow an event of steady running to its end, or until a guard ends it."""
         stop = begin + event.time_followed(self.rig.operation.turn)
         progress = self._progress(event.title, before)
         transient = follow(self.rig, simulation, event, begin, stop, progress, self.rig.guards)
@@ -263,6 +266,7 @@ class Runner:
         return transient
 
     def _loaded_start(self, event: Event, before: float, check: bool) -> None:
+        """Run a start under load; with `check` compare it with the monolithic solution."""
         progress = self._progress(event.title, before)
         with self.rig.from_rest(event) as simulation:
             run = simulation.run(self.stop, self.rig.step, progress, guards=self.rig.guards)

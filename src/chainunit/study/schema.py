@@ -163,23 +163,27 @@ class _Schema:
         }
 
     def _add(self, properties: dict[str, Any], table: KeyTable) -> None:
-        """Add the keys of a table to its properties; a key that is there already takes the values of both."""
+        """Add the keys of a table to its `properties`: a key as ``rotor.J`` to those of ``rotor``, one as ``NAME.J``
+        to those of tables with any name. A key that is there already takes the values of both."""
         for key in table.keys:
-            *tables, name = key.name.split(".")
-            place, form = properties, self._form(key, table)
-            holder: dict[str, Any] = {}
-            for part in tables:
-                if part == NAME and not holder["additionalProperties"]:
-                    del holder["additionalProperties"]
-                holder = _object(*((holder, "additionalProperties") if part == NAME else (place, part)))
-                place = holder["properties"]
+            *inner_tables, name = key.name.split(".")
+            inner, holder = properties, dict[str, Any]()
+            for table_name in inner_tables:
+                if table_name != NAME:
+                    holder = _object(inner, table_name)
+                else:
+                    if not holder["additionalProperties"]:
+                        del holder["additionalProperties"]
+                    holder = _object(holder, "additionalProperties")
+                inner = holder["properties"]
+            form = self._form(key, table)
             if table.of:
                 form["description"] = f"{table.of}: {form['description']}"
-            other = place.setdefault(name, form)
-            others = other.get("anyOf", [other])
-            if other is not form and form not in others:
-                description = "; ".join(dict.fromkeys((other["description"], form["description"])))
-                place[name] = {"anyOf": [*others, form], "description": description}
+            present = inner.setdefault(name, form)
+            forms = present.get("anyOf", [present])
+            if present is not form and form not in forms:
+                description = "; ".join(dict.fromkeys((present["description"], form["description"])))
+                inner[name] = {"anyOf": [*forms, form], "description": description}
 
     def _event(self, table: KeyTable, *, random: bool = False) -> dict[str, Any]:
         """The form of an event of one type; a `random` one may have a pair of ends for a quantity."""

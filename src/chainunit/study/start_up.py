@@ -18,8 +18,7 @@ from .rig import Rig, join
 from .window import Phase, Window, is_settled, whole_turns
 
 _LONGEST_START = 30.0
-"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `LONGEST_RISE`
-[s]."""
+"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `LONGEST_RISE` [s]."""
 LONGEST_RISE = 600.0
 """Time after the ramp at which an empty machine is fed, however slowly it turns, and for which a machine may speed
 up [s]."""
@@ -63,9 +62,8 @@ class StartUp:
 def _start_empty(
     rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
 ) -> tuple[Dataset, Rig]:
-    """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a
-    guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
-    from then on."""
+    """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a guard ends
+    it, or until it is clear that the machine speeds up too slowly; and the rig that is fed from then on."""
     # behind a shaft line the crank is not where the motor is
     name, ratio = rig.drive.crank_output("w")
     goal = STARTED * rig.operation.crank_speed * ratio
@@ -75,8 +73,8 @@ def _start_empty(
     run = simulation.run(stop, rig.step, progress, guards=speed_limit)
     while stop - 0.5 * rig.step <= simulation.time < longest:
         speed = float(run[name][-1])
-        before = float(run[name].sel(time=stop - piece, method="nearest"))
-        if goal - speed > (speed - before) / piece * (longest - stop):
+        acceleration = (speed - float(run[name].sel(time=stop - piece, method="nearest"))) / piece
+        if goal - speed > acceleration * (longest - stop):
             break
         stop = min(stop + piece, longest)
         run = join([run, simulation.run(stop, rig.step, progress, guards=speed_limit)])
@@ -138,8 +136,8 @@ def speeds_up(rig: Rig, run: Dataset, before: float = 0.0) -> bool:
     span = float(time[-1]) - begin
     rise, mean = float(speed[-1]) - slower, 2.0 * math.pi / span
     lack = STARTED * rig.operation.crank_speed - mean
-    left = rig.operation.ramp_end + LONGEST_RISE - before - float(time[-1])
-    return lack > 0.0 and rise > RISES * mean and lack * span <= rise * left
+    remaining = rig.operation.ramp_end + LONGEST_RISE - before - float(time[-1])
+    return lack > 0.0 and rise > RISES * mean and lack * span <= rise * remaining
 
 
 def until_settled(rig: Rig, simulation: Simulation, stop: float, length: float, late: float) -> list[Dataset]:

@@ -193,11 +193,9 @@ def weak_in_star(findings: StudyFindings) -> bool:
 
 def transient_words(setup: StudySetup) -> str:
     """The title of the largest torque of a start at the output of the gear, with the electromagnetic transient."""
-    line = (
-        "with the stiffness of the driveline"
-        if setup.drive.line.is_elastic
-        else "an upper bound, as the shafts are rigid"
-    )
+    line = "an upper bound, as the shafts are rigid"
+    if setup.drive.line.is_elastic:
+        line = "with the stiffness of the driveline"
     return f"electromagnetic transient of the motor puts more on it for some milliseconds ({line})"
 
 

@@ -113,11 +113,8 @@ def _key(name: str) -> str:
 def _value(value: Any) -> str:
     """A value as TOML writes it."""
     if isinstance(value, Mapping):
-        return (
-            f"{{ {', '.join(f'{_key(name)} = {_value(x)}' for name, x in value.items())} }}"
-            if value
-            else "{}"
-        )
+        entries = ", ".join(f"{_key(name)} = {_value(x)}" for name, x in value.items())
+        return f"{{ {entries} }}" if value else "{}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, bool):

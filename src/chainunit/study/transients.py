@@ -70,24 +70,23 @@ def follow(
     progress: Progress | None = None,
     guards: Mapping[str, float] | None = None,
 ) -> Transient:
-    """Run an event from the saved state to the time `stop` [s], or until a guard ends it."""
+    """Run an event from the saved state to the time `stop` [s], or until a guard ends it. An event that reads outputs
+    of the machine at its begin needs a run to there first; its inputs may jump then."""
     simulation.restore()
-    before: dict[str, float] = {}
-    state: dict[str, float] = {}
-    pieces = []
+    normal_inputs, outputs, pieces = dict[str, float](), dict[str, float](), []
     if event.reads:
-        before = dict(rig.inputs[name] for name in event.inputs)
-        simulation.signals = rig.signals(before)
+        normal_inputs = dict(rig.inputs[name] for name in event.inputs)
+        simulation.signals = rig.signals(normal_inputs)
         pieces.append(simulation.run(begin, rig.step, progress))
-        state = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
-    signals = rig.event_signals(event, begin, state)
+        outputs = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
+    signals = rig.event_signals(event, begin, outputs)
     simulation.signals = rig.signals(signals)
     pieces.append(simulation.run(stop, rig.step, progress, guards=guards))
-    jumps = {
-        full: Jump(begin, value, after)
-        for full, value in before.items()
-        if not isinstance(after := signals[full], Profile)
-    }
+    jumps = {}
+    for full, value in normal_inputs.items():
+        after = signals[full]
+        if not isinstance(after, Profile):
+            jumps[full] = Jump(begin, value, after)
     return Transient(event, begin, join(pieces), signals, jumps, pieces[0] if jumps else None)
 
 
@@ -110,10 +109,10 @@ def coast(rig: Rig, transient: Transient, run: Dataset, stop: float, file: Path)
     model = coasting_model(rig.drive)
     start = model.start_from({k: float(x[-1]) for k, x in machine_series(run).items()})
     p = model.parameter_layout.from_names(coasting_parameters(rig.drive) | start)
-    alone = System({"machine": ModelComponent(model, p, file)})
+    machine_alone = System({"machine": ModelComponent(model, p, file)})
     loads = rig.drive.loads(rig.operation.feed) | transient.signals
     loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
-    with rig.simulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
+    with rig.simulation(machine_alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
         return simulation.run(max(stop, begin) + 1.0, rig.step)
 
 
@@ -122,18 +121,17 @@ def release(rig: Rig, simulation: Simulation, run: Dataset, time: float) -> tupl
     coupling; and the energy that passes in that time [J]."""
     if time <= 0.0:
         return run, 0.0
-    rest = simulation.run(simulation.time + time, min(rig.step, time))
-    torque, speed = (rest[name] for name in (rig.drive.motor_torque, rig.drive.motor_speed))
-    energy = float(np.trapezoid(torque * speed, rest["time"]))
-    return join([run, rest]), energy
+    decay = simulation.run(simulation.time + time, min(rig.step, time))
+    torque, speed = (decay[name] for name in (rig.drive.motor_torque, rig.drive.motor_speed))
+    energy = float(np.trapezoid(torque * speed, decay["time"]))
+    return join([run, decay]), energy
 
 
 def compare(
     rig: Rig, run: Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Compare a run with the monolithic solution of the same signals, from the states `start` on or from
-    rest. Returns the differences of torque and speed, relative to their peaks, and the states at the
-    end."""
+    """Compare a run with the monolithic solution of the same signals, from the states `start` on or from rest.
+    Returns the differences of torque and speed, relative to their peaks, and the states at the end."""
     profiles = transient.signals if transient else {}
     signals: dict[str, Any] = dict(rig.signals(profiles, ramp=start is None))
     if transient:

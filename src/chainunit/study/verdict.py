@@ -216,28 +216,28 @@ class Verdict:
         return ". ".join(filter(None, (f"{line}: {holds}", limits, remedy))) + "."
 
     def details(self, titles: Mapping[str, str]) -> list[Remark]:
-        """A remark for each topic: the runs, by their `titles`, with their numbers."""
-        lines, titles = [], {**titles, **self.titles}
+        """A remark for each topic with reasons: the runs, by their `titles`, with their numbers; runs beyond a limit
+        of the crank speed have a remark for each limit instead."""
+        remarks, titles = [], {**titles, **self.titles}
         for topic, (_, code, _) in self.topics.items():
-            runs: dict[str, list[str]] = {}
-            limits: dict[float, list[str]] = {}
+            numbers_by_run: dict[str, list[str]] = {}
+            runs_by_limit: dict[float, list[str]] = {}
             for reason in self.reasons:
-                if reason.topic != topic:
-                    continue
-                if reason.quantity == "crank_speed":
-                    limits.setdefault(reason.limit, []).append(reason.run)
-                else:
-                    runs.setdefault(reason.run, []).append(reason.numbers)
-            for limit, judged in limits.items():
-                where = "; ".join(titles.get(run, run) for run in judged if run)
-                lines.append(on_limit(topic, limit, where and f": {where}"))
-            places = [
-                f"{titles.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
-                for run, sizes in runs.items()
-            ]
+                if reason.topic == topic and reason.quantity == "crank_speed":
+                    runs_by_limit.setdefault(reason.limit, []).append(reason.run)
+                elif reason.topic == topic:
+                    numbers_by_run.setdefault(reason.run, []).append(reason.numbers)
+            for limit, runs in runs_by_limit.items():
+                where = "; ".join(titles.get(run, run) for run in runs if run)
+                remarks.append(on_limit(topic, limit, where and f": {where}"))
+            places = []
+            for run, sizes in numbers_by_run.items():
+                numbers = ", ".join(sizes)
+                # a number of no run stands alone
+                places.append(f"{titles.get(run, run)} ({numbers})" if run else numbers)
             if places:
-                lines.append(code.remark(where="; ".join(places)))
-        return lines
+                remarks.append(code.remark(where="; ".join(places)))
+        return remarks
 
     @derived("rad/s", "speed")
     def reached(self) -> float:

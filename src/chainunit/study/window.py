@@ -32,8 +32,7 @@ BURNT = 2000.0
 CLOSED = 0.01
 """Gap between the ends of the steady turns up to which the turns count as closed."""
 DRIFT = 0.1
-"""Change of the speed over the steady turns, relative to its ripple, up to which the speed counts as
-steady."""
+"""Change of the speed over the steady turns, relative to its ripple, up to which the speed counts as steady."""
 STORED = 0.002
 """Energy that the moving masses take up over the steady turns, relative to the energy that passes the motor's shaft,
 up to which the turns count as steady."""
@@ -158,8 +157,9 @@ class Window:
 
     @cached_property
     def lasts(self) -> bool:
-        """Whether means of steady running stand for running that lasts. They do not where the moving masses take up
-        more than `LASTING`, or the crank turns and makes no whole turn. Some machines never repeat a turn."""
+        """Whether means of steady running stand for running that lasts: where the moving masses take up at most
+        `LASTING` of the energy over the turns, or the crank stands. A crank that makes a part of a turn is on its
+        way. Of a machine that never repeats a turn, and of other phases, no more is asked."""
         if self.phase is not Phase.STEADY or self.drive.simulated_machine.model.never_repeats:
             return True
         if not has_turn(self.drive, self.run):
@@ -194,8 +194,7 @@ class Window:
         return float(np.max(np.sqrt(sum((x - middle) ** 2 for x, middle in parts))))
 
     def least_pull(self, rod: str) -> float:
-        """Least pull in a kind of rod ("web" or "wall") on either side [N]; infinite where no organ has a
-        weight."""
+        """Least pull in a kind of rod ("web" or "wall") on either side [N]; infinite where no organ has a weight."""
         assert self.drive.chain_unit
         pulls = (float(np.min(self.value(f"machine.{side}.{rod}_pull"))) for side in self.sides)
         return min(pulls, default=math.inf)
@@ -230,8 +229,7 @@ def time_at(drive: Drive, run: Dataset, angle: float) -> float | None:
 
 
 def end_gap(drive: Drive, turns: Dataset) -> float:
-    """Difference between the ends of `turns` over the largest value: the larger one of crank speed and
-    torque."""
+    """Difference between the ends of `turns` over the largest value: the larger one of crank speed and torque."""
     _, speed = crank_motion(drive, turns)
     sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, crank_torque(drive, turns)))
     return max(abs(float(size)) for size in sizes)

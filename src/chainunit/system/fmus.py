@@ -34,15 +34,13 @@ def export(
                 file = folder / f"{model.name}.fmu"
                 if file in files.values():
                     file = folder / f"{model.name}_{name}.fmu"
-                of_model = _of_model(model.name, progress)
-                of_model("exporting")
-                origins[name] = export_fmu(model, file, component.start, backend=backend, progress=of_model)
+
+                def report(activity: str, model_name: str = model.name) -> None:
+                    progress(f"{model_name}: {activity}")
+
+                report("exporting")
+                origins[name] = export_fmu(model, file, component.start, backend=backend, progress=report)
                 files[model] = file
             component = replace(component, file=files[model])
         components[name] = component
     return replace(system, components=components), origins
-
-
-def _of_model(name: str, progress: Callable[[str], None]) -> Callable[[str], None]:
-    """A progress that puts the name of the model before each text."""
-    return lambda what: progress(f"{name}: {what}")

@@ -570,14 +570,11 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     tried = []
 
     def gentlest(trials, study, chosen, goal, limit):
-        rigs = list(trials)
-        tried.append(({rig.drive.parameters.inverter.boost for rig, *_ in rigs}, len(rigs)))
-        rig, _, numbers, _ = rigs[0]
-        return (
-            (rig, on_line.findings.by_analysis["starts"].starts, numbers)
-            if numbers["boost"] == 0.15
-            else None
-        )
+        starters = list(trials)
+        boosts = {starter.rig.drive.parameters.inverter.boost for starter in starters}
+        tried.append((boosts, len(starters)))
+        starts = on_line.findings.by_analysis["starts"].starts
+        return (starters[0], starts) if starters[0].numbers["boost"] == 0.15 else None
 
     monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
     monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))

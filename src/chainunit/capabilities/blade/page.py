@@ -51,6 +51,7 @@ def _spans(findings: BladeFindings) -> list[fig.Shade]:
 
 
 def _figure(setup: StudySetup, findings: BladeFindings) -> fig.Figure:
+    """The linkage while its blade falls, the path of the blade, and its tilt over the turn."""
     angle = findings.turn.angle
     fall = (float(angle[np.argmin(findings.blade.y)]) - findings.top) % (2.0 * math.pi)
     metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))

@@ -8,12 +8,14 @@ mean axial pull is below zero.
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
+from itertools import groupby, pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -142,9 +144,10 @@ def run_turns(
     ratio = drive.driven_machine.p.ratio
     step = 2.0 * math.pi / crank_speed / points
     parameters = drive.simulated_machine.by_name | Layout(Feed).by_name(feed)
-    finished = [0]
+    finished = itertools.count(1)
 
-    def one(start: int, stop: Callable[[], bool]) -> Any:
+    def run_of(start: int, stop: Callable[[], bool]) -> Any:
+        """The rows of the run from the start angle of that number; it counts from the end of its settling."""
         unit = Instance(fmu, f"start {start}")
         try:
             # the FMU extrapolates the angle by the speed: no input has to be set any more
@@ -163,19 +166,17 @@ def run_turns(
             return rows
         finally:
             unit.close()
-            finished[0] += 1
-            progress(finished[0] / starts)
+            progress(next(finished) / starts)
 
     guard = nullcontext(is_stopped) if is_stopped else stoppable()
     with guard as stop, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
-        rows = list(pool.map(one, range(starts), [stop] * starts))
+        rows = list(pool.map(run_of, range(starts), [stop] * starts))
     series = np.array(rows).reshape(starts, turns, points, len(names))
-    first = len(outputs)
-    count = len(rods) // 2
+    pulls = np.split(series[..., len(outputs) :], len(SIDES), axis=-1)
     return Turns(
-        2.0 * math.pi * np.arange(1, points + 1) / points,
-        {name: series[..., k] for k, name in enumerate(outputs)},
-        {side: series[..., first + count * k : first + count * (k + 1)] for k, side in enumerate(SIDES)},
+        angle=2.0 * math.pi * np.arange(1, points + 1) / points,
+        values={name: series[..., k] for k, name in enumerate(outputs)},
+        pulls=dict(zip(SIDES, pulls, strict=True)),
     )
 
 
@@ -228,8 +229,8 @@ def numbers_at(
         is_stopped=is_stopped,
     )
     values, ratio = sample.values, drive.driven_machine.p.ratio
-    two = cycle(drive.machine, crank_speed, feed)
-    snatches, two_bar_snatch = _snatches(drive, feed, values, two)
+    bars = cycle(drive.machine, crank_speed, feed)
+    snatches, two_bar_snatch = _snatches(drive, feed, values, bars)
     is_pushed = drive.chain_unit.mean_pulls(crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
@@ -253,9 +254,9 @@ def numbers_at(
             slack_time_to=slack_time.high,
             slack_rods=float(np.mean(all_rods)),
             fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in SIDES)),
-            two_bar_crank_torque=peak(two.crank_torque),
-            two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
-            two_bar_rocker_torque=peak(two.outputs.rocker.tau),
+            two_bar_crank_torque=peak(bars.crank_torque),
+            two_bar_crank_torque_rms=float(np.sqrt(np.mean(bars.crank_torque**2))),
+            two_bar_rocker_torque=peak(bars.outputs.rocker.tau),
             two_bar_snatch=two_bar_snatch,
             two_bar_slack_time=float(np.mean(np.any(is_pushed, axis=0))),
             energy_residual=gap / max(energy, 1e-300),
@@ -278,9 +279,9 @@ def _snatches(drive: Drive, feed: Feed, values: Mapping[str, Any], two_bars: Cyc
     for side in SIDES:
         bars = getattr(two_bars.outputs, side).rocker_joint
         force = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
-        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
-        of_chains.append(_peaks(force) / rest)
-        of_bars.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
+        force_at_rest, bar_force_at_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
+        of_chains.append(_peaks(force) / force_at_rest)
+        of_bars.append(np.max(np.hypot(bars.fx, bars.fy)) / bar_force_at_rest)
     return np.maximum(*of_chains), float(max(of_bars))
 
 
@@ -338,6 +339,8 @@ def study_chain(
     with stoppable() as is_stopped, closing(Fmu(file)) as fmu:
 
         def run_at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
+            """The numbers of the chains at the crank speed `w`, the one of number `k`."""
+
             def report_share(share: float) -> None:
                 progress(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
@@ -383,12 +386,12 @@ def _rocker_at_rest(drive: Drive, feed: Feed) -> float:
 
 
 def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf) -> list[Band]:
-    """Speeds to avoid, from rows in rising order. Neighbours with the same reason are one
-    band. The band begins halfway to the last good speed below and ends halfway to the next good speed above,
-    but no farther than `reach` [rad/s] from a speed that was run. `at_rest` is the rocker torque of two bars
-    at rest [N.m]."""
+    """Speeds to avoid, from rows in rising order. Neighbours with the same reason are one band, which begins and ends
+    halfway to the next speeds that were run, but no farther than `reach` [rad/s] from its own. `at_rest` is the
+    rocker torque of two bars at rest [N.m]."""
 
     def why(n: SpeedNumbers) -> str:
+        """The reasons to avoid a speed, in words; empty for a good one."""
         reasons = []
         if n.slack_time > AVOID_SLACK:
             reasons.append("rods go slack and snatch")
@@ -399,17 +402,13 @@ def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf)
         return ", and ".join(reasons)
 
     speeds = [n.speed for n in rows]
+    # the distances from each speed to the ends of a band below and above it; the outer rows are outer ends
+    halfway = [min(reach, 0.5 * (above - below)) for below, above in pairwise(speeds)]
+    to_low, to_high = [0.0, *halfway], [*halfway, 0.0]
     critical: list[Band] = []
-    begin: int | None = None
-    for k in range(len(rows) + 1):
-        now = why(rows[k]) if k < len(rows) else ""
-        if begin is not None and now != why(rows[begin]):
-            low = speeds[begin] - (
-                0.0 if begin == 0 else min(reach, 0.5 * (speeds[begin] - speeds[begin - 1]))
-            )
-            high = speeds[k - 1] + (0.0 if k == len(rows) else min(reach, 0.5 * (speeds[k] - speeds[k - 1])))
-            critical.append(Band(low, high, why(rows[begin])))
-            begin = None
-        if begin is None and now:
-            begin = k
+    for reason, neighbours in groupby(range(len(rows)), lambda k: why(rows[k])):
+        places = list(neighbours)
+        low, high = places[0], places[-1]
+        if reason:
+            critical.append(Band(speeds[low] - to_low[low], speeds[high] + to_high[high], reason))
     return critical

@@ -79,16 +79,19 @@ _NOT_FELT = warning(
 
 
 def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]) -> Verdict:
-    """The verdict on the chains of a study; arguments are those of `chains`."""
+    """The verdict on the chains of a study, by its runs and, where these were made, the turns at constant speed: by
+    the folds and the slack of their rods, their energy residuals and the number of turns. For arguments see
+    `chains`."""
     runs = study.runs
     answers: dict[str, Answers | None] = {**runs.answers, START: runs.start, SETTLING: runs.settling}
     folds = {name: a.fold_largest for name, a in answers.items() if a is not None}
     slack = {name: a.slack_time for name, a in answers.items() if a is not None}
     residuals, turns = dict(residuals), math.inf
     if (findings := ChainResult.found_in(study.findings)) is not None:
-        numbers = findings.own
-        folds[CONSTANT], slack[CONSTANT] = numbers.fold_largest, numbers.slack_time
-        residuals[CONSTANT], turns = numbers.energy_residual, numbers.independent_turns
+        at_constant_speed = findings.own
+        folds[CONSTANT], slack[CONSTANT] = at_constant_speed.fold_largest, at_constant_speed.slack_time
+        residuals[CONSTANT] = at_constant_speed.energy_residual
+        turns = at_constant_speed.independent_turns
     limit, least_turns = study.setup.config.table("chain").fold_limit, runs_needed(HIGH)
     return chains(speed, residuals, folds, limit, slack, turns, least_turns, actual=actual)
 

@@ -61,16 +61,12 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         ends = number(x.speeds[0].speed), number(x.speeds[-1].speed)
         yield b.Text(filled("No speed to avoid from {} to {}.", *ends), "fine")
     yield _at_study_speed(x)
-    slack = {
-        side: join(
-            filled("{}: {}", rod.rod, number(rod.share))
-            for rod in rods
-            if (number(rod.share).value or 0.0) > 0.0
-        )
-        for side, rods in x.slack_by_rod.items()
-    }
+    slack = {}
+    for side, rods in x.slack_by_rod.items():
+        slack_rods = (rod for rod in rods if (number(rod.share).value or 0.0) > 0.0)
+        slack[side] = join(filled("{}: {}", rod.rod, number(rod.share)) for rod in slack_rods)
     if any(slack.values()):
-        rows = tuple(b.TableRow((side, slack_rods or "none")) for side, slack_rods in slack.items())
+        rows = tuple(b.TableRow((side, shares or "none")) for side, shares in slack.items())
         yield b.Table(rows, title="Rods that go slack, share of the time", numeric=False)
     if len(chain.speeds) > 1:
         yield _sweep(x)
@@ -122,6 +118,7 @@ def _at_study_speed(x: ChainResult) -> b.Table:
 
 
 def _sweep(x: ChainResult) -> b.Table:
+    """A row for each speed of the sweep: torques of chains and of two bars, snatch, slack."""
     quantile = exact(x.quantile)
     columns: dict[str, Line] = {
         "crank_torque_median": "crank torque: median",
@@ -147,28 +144,24 @@ def _sweep(x: ChainResult) -> b.Table:
 
 
 def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
-    """Critical crank speeds: all of them in a table, those within the sweep in a sentence."""
+    """Critical crank speeds: all of them in a table of modes and orders, those within the sweep in a sentence."""
     modes: dict[int, dict[int, CriticalSpeed]] = {}
     for speed, shown in zip(chain.critical, x.critical, strict=True):
         modes.setdefault(speed.mode, {})[speed.order] = shown
-    rows = (
-        b.TableRow(
-            (
-                filled("mode {}", exact(next(iter(by_order.values())).mode)),
-                *(number(shown.speed) for shown in by_order.values()),
-            )
-        )
-        for by_order in modes.values()
-    )
+    rows = []
+    for by_order in modes.values():
+        first, *_ = by_order.values()
+        speeds = (number(shown.speed) for shown in by_order.values())
+        rows.append(b.TableRow((filled("mode {}", exact(first.mode)), *speeds)))
     orders = (filled("order {}", exact(shown.order)) for shown in next(iter(modes.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    inside = [
+    swept = [
         line(number(modes[speed.mode][speed.order].speed), f" (mode {speed.mode}, order {speed.order})")
         for speed in sorted(chain.within_speeds(), key=lambda speed: speed.speed)
     ]
-    if inside:
-        yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
+    if swept:
+        yield b.Text(line("Critical speeds within the sweep: ", join(swept), f". {_ORDERS}"), form="short")
 
 
 @PICTURES.declare(lambda study: len(ChainResult.of_study(study.findings).speeds) > 1, "chain_sweep.png")
@@ -179,37 +172,35 @@ def _over_speed(study: StudyRecord) -> fig.Figure:
     speed = np.array([n.speed for n in rows])
     over = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # the least distance of 5 % keeps labels apart on a narrow screen, too
-    labels: list[fig.Item] = [
-        fig.Mark(
-            critical.speed,
-            words=f"mode {critical.mode}" + (f", order {critical.order}" if critical.order > 1 else ""),
-            look="thin",
-            upright=True,
+    labels: list[fig.Item] = []
+    for critical in result.within_speeds(0.05):
+        order = f", order {critical.order}" if critical.order > 1 else ""
+        labels.append(
+            fig.Mark(critical.speed, words=f"mode {critical.mode}{order}", look="thin", upright=True)
         )
-        for critical in result.within_speeds(0.05)
-    ]
     marks: list[fig.Item] = [
         *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
         *(fig.Mark(critical.speed, look="thin") for critical in result.within_speeds()),
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 
-    def pair(median: Any, two: Any) -> list[fig.Item]:
+    def pair(median: Any, bars: Any) -> list[fig.Item]:
+        """The curves of chains and of two bars, with the marks of all panels."""
         return [
             fig.Curve("chains, median", speed, median, 0, "o"),
-            fig.Curve("two bars", speed, two, 1, "s"),
+            fig.Curve("two bars", speed, bars, 1, "s"),
             *marks,
         ]
 
     panels: list[tuple[fig.Axis, list[fig.Item]]] = []
     for part in ("rocker", "crank"):
         names = (f"{part}_torque_median", f"{part}_torque_high", f"two_bar_{part}_torque")
-        median, high, two = (np.array([getattr(n, name) for n in rows]) for name in names)
-        sizes = np.concatenate([median, high, two])
+        median, high, bars = (np.array([getattr(n, name) for n in rows]) for name in names)
+        sizes = np.concatenate([median, high, bars])
         wide = float(np.nanmax(sizes)) > WIDE * max(float(np.nanmin(sizes)), 1e-9)
         quantile = fig.Between(f"chains, up to the {100 * HIGH:g} % quantile", speed, median, high)
         y = fig.Axis(f"{part} torque, peak", "N.m", low=None if wide else 0.0, log=wide)
-        panels.append((y, [quantile, *pair(median, two), *([] if panels else labels)]))
+        panels.append((y, [quantile, *pair(median, bars), *([] if panels else labels)]))
     slack = pair([n.slack_time for n in rows], [n.two_bar_slack_time for n in rows])
     panels.append((fig.Axis("time slack", "1", "percent", low=-0.04, high=1.04), slack))
     return fig.Figure(

@@ -85,11 +85,8 @@ class CheckAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> CheckFindings:
         """The checks over steady running, and of the largest loads of all runs."""
         plan: CheckPlan = study.setup.config.plans[CheckAnalysis.name]
-        checks, turns, line = (
-            Checks(tables=study.setup.config.values),
-            has_turn(study.setup.drive, study.runs.steady),
-            study.setup.statics.rigid_line,
-        )
+        checks, line = Checks(tables=study.setup.config.values), study.setup.statics.rigid_line
+        turns = has_turn(study.setup.drive, study.runs.steady)
         rolling, plain = bearings.find(study.runs, plan.bearings, checks) if turns else ({}, {})
         if line is None:
             why = "the file gives no elastic line; add [driveline]"

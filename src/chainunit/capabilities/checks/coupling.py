@@ -292,6 +292,7 @@ def find(runs: StudyRuns, plan: CheckPlan, checks: Checks) -> CouplingCheck | No
     )
 
     def check(table: FlexibleCouplingTable, checks: Checks) -> CouplingCheck:
+        """The coupling by its table; its rows go to the `checks`."""
         series = (turns["time"].values, torque)
         coupling = coupling_check(table, duty, *series, factor, plan.coupling_place, run)
         check_coupling(checks, coupling, table, runs.title_of(run))

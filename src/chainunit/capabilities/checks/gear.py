@@ -221,12 +221,8 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | Non
 
 def motor_shaft(runs: StudyRuns, plan: CheckPlan, checks: Checks) -> ShaftLoad | None:
     """The radial force on the motor's shaft, and its `checks`."""
-    what, table, drive, turns = (
-        "overhung load of the motor's shaft",
-        plan.motor_shaft,
-        runs.drive,
-        runs.steady,
-    )
+    what, table = "overhung load of the motor's shaft", plan.motor_shaft
+    drive, turns = runs.drive, runs.steady
     direct = drive.ratio == 1.0
     if not table.overhung_load:
         why = "the file gives no permitted load; add [motor_shaft] with overhung_load"

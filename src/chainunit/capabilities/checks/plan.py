@@ -133,11 +133,11 @@ def _check_coupling(entry: Entry, designations: Collection[str]) -> None:
     """Refuse a designation that is not one of these of the catalogues, and beside them the values of a row."""
     name = entry.given.get("designation", "")
     if name and name not in designations:
-        some = f"must be one of {', '.join([*designations][:5])}{near_name(name, designations)}"
+        choices = f"must be one of {', '.join([*designations][:5])}{near_name(name, designations)}"
         entry.wrong(
             "designation",
             name,
-            f"not in the catalogue; {some if designations else 'no catalogue has flexible couplings'}",
+            f"not in the catalogue; {choices if designations else 'no catalogue has flexible couplings'}",
         )
     for key in t.OF_ROW if designations else ():
         if key in entry.given:
@@ -162,9 +162,10 @@ def _check_keys(
 def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:
     """By title of its pin, the bearing of each of the `tables` [bearing.name]: a name that several pins begin with
     stands for a bearing in each of them."""
-    taken: dict[str, str] = {}
+    owner: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
+        """The pins that the name of a table stands for, and the bearing in each of them."""
         pins = _pins_named(name, titles)
         if not pins:
             entry.fault("", _no_pin(name, titles))
@@ -174,11 +175,11 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
             entry.refuse()
         _check_keys(entry, "kind", kind, t.NEEDED[kind], t.BEARING_KEYS)
         for pin in pins:
-            if pin in taken:
+            if pin in owner:
                 entry.fault(
-                    "", f"the pin {pin} has its bearing in bearing.{taken[pin]}; leave out one of the two"
+                    "", f"the pin {pin} has its bearing in bearing.{owner[pin]}; leave out one of the two"
                 )
-            taken[pin] = name
+            owner[pin] = name
         table = instance(t.BearingTable, entry.raw)
         if table.static_safety is None and kind != t.PLAIN:
             table = replace(table, static_safety=t.STATIC_SAFETY[kind])
@@ -193,14 +194,15 @@ def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
     """By name, the section of each of the `tables` [section.name], with the whole title of its pin."""
 
     def read(entry: Entry, name: str) -> SectionPlan:
+        """The section of a table: texts (pin, notch and the like), and quantities by `SectionTable`."""
         for key in t.SECTION_NEEDS:
             if key not in entry.raw:
                 choice = f", one of {', '.join(t.NOTCHES)}" if key == "notch" else ""
                 entry.fault(key, f"must be given{choice}")
-        keys = {key: entry.raw.pop(key) for key in t.SECTIONS.keys if key in entry.raw}
-        if pin := keys.get("pin"):
-            keys["pin"] = _only_pin(entry, pin, titles)
-        notch = keys.get("notch", "none")
+        texts = {key: entry.raw.pop(key) for key in t.SECTIONS.keys if key in entry.raw}
+        if pin := texts.get("pin"):
+            texts["pin"] = _only_pin(entry, pin, titles)
+        notch = texts.get("notch", "none")
         needed = t.NOTCH_KEYS[t.SHOULDER] if notch == t.SHOULDER else ()
         _check_keys(entry, "notch", notch, needed, t.NOTCH_KEYS)
         entry.refuse()
@@ -209,7 +211,7 @@ def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
             entry.fault("bore", "must be less than the diameter")
         if notch == t.SHOULDER:
             _check_shoulder(entry, table)
-        return SectionPlan(table, **keys)
+        return SectionPlan(table, **texts)
 
     return t.SECTIONS.read_named(tables, faults, read)
 

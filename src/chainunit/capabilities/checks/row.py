@@ -78,9 +78,11 @@ class CheckRule:
         self, part: str, path: str, numbers: Any, limit: float, tables: Mapping[str, Any], **slots: str
     ) -> CheckRow:
         """The row of a part: its `numbers` are a result that stands at `path` of the findings; `tables` are tables of
-        the study file."""
-        size, letters = _size(numbers, self.value, slots), {}
-        for letter, place in (pair.split(" = ") for pair in self.letters.split("; ") if pair):
+        the study file, and `slots` the texts for the slots of the rule. Each letter of the formula gets its number
+        and the place of it in result.json."""
+        size, letters = _size(numbers, self.value, slots), dict[str, tuple[InUnit, str]]()
+        for pair in filter(None, self.letters.split("; ")):
+            letter, place = pair.split(" = ")
             if place.startswith("/"):
                 letters[letter] = _size(tables, place[1:], slots), f"given.{place[1:]}"
             elif (number := _size(numbers, place, slots)).value is not None:

@@ -366,13 +366,15 @@ def find(runs: StudyRuns, plans: Mapping[str, SectionPlan], checks: Checks) -> d
             continue
         force = peak(pin_force(drive, turns, pin))
         if plan.on == "link":
+            # its force swings in any direction
             amplitude, mean = np.array([force]), np.zeros(1)
         else:
             angle = turned[machine.model.pins[bearing]] if plan.on == "crank" else 0.0
             fx, fy = (turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy"))
             amplitude, mean = fibres(fx, fy, angle)
         most, run = largest_load(runs.pins, pin)
-        args = (amplitude, mean, force, most, torque, largest_torque, pin, run)
-        sections[name] = shaft_section(plan, *args)
+        sections[name] = shaft_section(
+            plan, amplitude, mean, force, most, torque, largest_torque, pin=pin, run=run
+        )
         check_section(checks, name, sections[name], plan.table.safety, runs.title_of(run))
     return sections

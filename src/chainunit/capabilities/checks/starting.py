@@ -34,8 +34,8 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> PermittedStarts
     plate = setup.plate.nameplate
     rise = runs.series["start_up"].sel(time=slice(None, runs.start.start_time))
     current, bare = runs.answers[STEADY].current_rms, plan.starting.permitted or plate.starts
-    asked = plan.starts_per_hour
-    data = starting_data(setup.drive, plate, rise, runs.steady, per_hour=asked, bare=bare, current=current)
+    per_hour = plan.starts_per_hour
+    data = starting_data(setup.drive, plate, rise, runs.steady, per_hour=per_hour, bare=bare, current=current)
     starts = permitted_starts(data, setup.proposal.permitted_starts if setup.proposal else math.inf)
     check_starts(checks, starts, is_chosen=setup.proposal is not None)
     return starts

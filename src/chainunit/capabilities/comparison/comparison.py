@@ -213,6 +213,7 @@ def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _same(a: Any, b: Any) -> bool:
+    """Whether two given values are equal, numbers but for rounding."""
     if all(isinstance(x, InUnit) and _is_finite(x.value) for x in (a, b)):
         return a.unit == b.unit and math.isclose(a.value, b.value, rel_tol=_ROUNDING)
     return bool(a == b)
@@ -224,15 +225,12 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
     nodes = {run: data.get(run) for run in ("start_up", "settling")}
     nodes |= {f"{table}.{run}": node for table in _RUNS for run, node in tables[table].items()}
     nodes[_RANDOM] = tables["monte_carlo"].get("quantiles")
-    runs = {
-        run: {
-            name: value
-            for name, value in _leaves(node, "")
-            if isinstance(value, InUnit) and not isinstance(value.value, list)
-        }
-        for run, node in nodes.items()
-    }
-    return {run: numbers for run, numbers in runs.items() if numbers}
+    runs = {}
+    for run, node in nodes.items():
+        leaves = {name: value for name, value in _leaves(node, "") if isinstance(value, InUnit)}
+        if numbers := {name: x for name, x in leaves.items() if not isinstance(x.value, list)}:
+            runs[run] = numbers
+    return runs
 
 
 # -- their words
@@ -240,9 +238,10 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
 
 def _spoken(name: str, descriptions: Mapping[str, str]) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
-    first, _, rest = name.partition(".")
-    rest = f"{rest[1:]} % of runs below" if rest[1:].isdigit() and rest[0] == "q" else rest.replace(".", ", ")
-    return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), rest)))
+    first, _, suffix = name.partition(".")
+    is_quantile = suffix[1:].isdigit() and suffix[0] == "q"
+    suffix = f"{suffix[1:]} % of runs below" if is_quantile else suffix.replace(".", ", ")
+    return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), suffix)))
 
 
 def _title(stored: StoredResult, run: str) -> str:
@@ -289,22 +288,18 @@ def _alone(
     descriptions: Mapping[str, str],
 ) -> Alone:
     """The runs, events and measures that one result has and the other has not."""
-    missing = [run for run in runs if run not in others]
-    # the further numbers of a run go with the run
-    whole = {run.removeprefix("answers.") for run in missing if run.startswith("answers.")}
+    answered = {
+        run.removeprefix("answers.") for run in runs if run.startswith("answers.") and run not in others
+    }
+    titles, measures = list[str](), list[str]()
+    for run, numbers in runs.items():
+        if run in others:
+            names = (name for name in numbers if name not in others[run])
+            measures += [f"{_title(mine, run)}: {_spoken(name, descriptions)}" for name in names]
+        elif run.startswith("answers.") or run.split(".")[-1] not in answered:
+            # the further numbers of a run go with its answers
+            titles.append(_title(mine, run))
     events = as_mapping(theirs.data.get("event"))
     return Alone(
-        [
-            _title(mine, run)
-            for run in missing
-            if run.startswith("answers.") or run.split(".")[-1] not in whole
-        ],
-        [name for name in as_mapping(mine.data.get("event")) if name not in events],
-        [
-            f"{_title(mine, run)}: {_spoken(name, descriptions)}"
-            for run, numbers in runs.items()
-            if run in others
-            for name in numbers
-            if name not in others[run]
-        ],
+        titles, [name for name in as_mapping(mine.data.get("event")) if name not in events], measures
     )

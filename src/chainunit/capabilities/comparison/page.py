@@ -106,8 +106,9 @@ def _digits(compared: ComparedValue) -> int:
 
 
 def _only(comparison: StudyComparison) -> Iterator[b.Block]:
-    for side, alone in comparison.only.items():
-        for noun, titles in (("runs", alone.runs), ("measures", alone.measures)):
+    """The runs and the measures that only one result has."""
+    for side, single in comparison.only.items():
+        for noun, titles in (("runs", single.runs), ("measures", single.measures)):
             if titles:
                 yield b.Text(f"Only {side.upper()} has the {noun}: {'; '.join(titles)}.")
 
@@ -121,16 +122,13 @@ def _runs(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
         short = {name for name in different if _is_short(run, name)}
         if not different:
             equal.append(compared.title)
-        rows = tuple(
-            b.TableRow(
-                (str(shown.title), *map(number, (shown.a, shown.b, shown.difference, shown.relative))),
-                form="both" if name in short else "long",
-            )
-            for name, shown in x.runs[run].measures.items()
-        )
+        rows = []
+        for name, shown in x.runs[run].measures.items():
+            numbers = map(number, (shown.a, shown.b, shown.difference, shown.relative))
+            rows.append(b.TableRow((str(shown.title), *numbers), form="both" if name in short else "long"))
         if rows:
             heads, title = b.heads("", "A", "B", "B - A", "relative"), capital(compared.title)
-            yield b.Table(rows, heads, title=title, form="both" if short else "long")
+            yield b.Table(tuple(rows), heads, title=title, form="both" if short else "long")
     if equal:
         yield b.Text(f"Every number is the same in: {'; '.join(equal)}.")
 

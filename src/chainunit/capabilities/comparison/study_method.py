@@ -24,13 +24,13 @@ class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], StudyCo
 
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """Each measure of each run that both have: the values of both, the difference, and its share."""
-        return {
-            f"{run.removeprefix('answers.')}.{name}": {
-                column: entry for column, entry in as_data(measure).items() if column != "title"
-            }
-            for run, compared in self._outcome.runs.items()
-            for name, measure in compared.measures.items()
-        }
+        rows = {}
+        for run, compared in self._outcome.runs.items():
+            for name, measure in compared.measures.items():
+                row = as_data(measure)
+                del row["title"]
+                rows[f"{run.removeprefix('answers.')}.{name}"] = row
+        return rows
 
 
 def compare(

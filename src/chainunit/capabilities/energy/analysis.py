@@ -191,6 +191,7 @@ class _Task:
     plan: UsagePlan
 
     def find(self) -> EnergyFindings | None:
+        """The energy of the motor of the study and of the other one; None where a load is not steady."""
         drive, motor = self.study.setup.drive, self.study.setup.plate
         inverter = self._inverter(drive, motor)
         duty = self._duty(drive, inverter, "")
@@ -238,6 +239,7 @@ class _Task:
         return InverterRating(losses, motor.nameplate)
 
     def _inverter_words(self) -> str:
+        """Where the losses of the inverter come from."""
         if self.plan.inverter_losses:
             return "interpolated between the eight operating points of IEC 61800-9-2 that usage.inverter_losses gives"
         return (
@@ -274,6 +276,7 @@ class _Task:
         return self._energy(duty, other.designation, _price(self.plan.table.other_price, other)), ""
 
     def _energy(self, duty: LoadDuty, name: str, price: float | None) -> MotorEnergy:
+        """Energy and cost of a year with a motor that runs this duty."""
         losses = duty.losses
         year = year_of(self.plan, float(losses.electric), price)
         speed = duty.mean(self.study.setup.drive.motor_speed)

@@ -79,6 +79,7 @@ def duty_of(
     feed = rig.operation.feed
 
     def duty_at(temperature: float) -> LoadDuty:
+        """The runs of all loads with a winding of this temperature [K]."""
         runs = {}
         for name, load in loads.items():
             progress(name)

@@ -115,8 +115,8 @@ def required(plate: Nameplate) -> str:
 def falls_short(plate: Nameplate) -> bool:
     """Whether the class of a motor is known and below the one that EU 2019/1781 asks of it."""
     order = ("IE1 or less", *CLASSES)
-    reached, asked = class_of(plate), required(plate)
-    return bool(reached and asked) and order.index(reached) < order.index(asked)
+    reached, demand = class_of(plate), required(plate)
+    return bool(reached and demand) and order.index(reached) < order.index(demand)
 
 
 def next_class(plate: Nameplate) -> tuple[str, float] | None:

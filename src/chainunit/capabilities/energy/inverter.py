@@ -54,11 +54,12 @@ def typical_losses(motor_power: float) -> tuple[float, ...]:
 
 
 def _by_size(motor_power: float, column: int) -> float:
+    """The value of a column of the reference table for a motor of this power [W]; beyond the table in proportion."""
     sizes, values = (np.array([row[k] for row in _REFERENCE]) for k in (0, column))
     kW = 1e-3 * motor_power
-    inside = min(max(kW, float(sizes[0])), float(sizes[-1]))
-    power = math.exp(float(np.interp(math.log(inside), np.log(sizes), np.log(values))))
-    return 1e3 * power * (kW / inside)
+    tabled_kW = min(max(kW, float(sizes[0])), float(sizes[-1]))
+    power = math.exp(float(np.interp(math.log(tabled_kW), np.log(sizes), np.log(values))))
+    return 1e3 * power * (kW / tabled_kW)
 
 
 def loss(losses: tuple[float, ...], frequency: Any, current: Any) -> Any:

@@ -80,12 +80,9 @@ class MotorClassAnalysis(Analysis):
 def words_of(motor_class: MotorClass) -> str:
     """Class and demand, in a sentence."""
     if motor_class.no_class:
-        asked = (
-            f" EU 2019/1781 asks {motor_class.required}: compare its nameplate."
-            if motor_class.required
-            else ""
-        )
-        return f"The class of the motor by IEC 60034-30-1 is not checked: {motor_class.no_class}.{asked}"
+        text = f"The class of the motor by IEC 60034-30-1 is not checked: {motor_class.no_class}."
+        demand = f" EU 2019/1781 asks {motor_class.required}: compare its nameplate."
+        return text + (demand if motor_class.required else "")
     if not motor_class.required:
         return f"The motor is {motor_class.efficiency_class}; EU 2019/1781 does not cover it."
     verb = "asks" if not motor_class.falls_short else "asks more,"

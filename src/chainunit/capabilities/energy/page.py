@@ -9,7 +9,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.cited import cited, exact, number
 from ...report.lines import Line, Number, filled, line
-from ...study.record import StudyRecord, StudySetup
+from ...study.record import StudyRecord
 from .analysis import EnergyFindings, MotorComparison, Year
 from .motor_class import MotorClass, words_of
 from .running import PLACES, Losses
@@ -17,22 +17,16 @@ from .running import PLACES, Losses
 PICTURE = "energy.png"
 
 
-def _titles(setup: StudySetup) -> dict[str, str]:
-    """The title of each power; the parts between motor and machine have their noun."""
-    return {v.name: v.template for v in Layout(Losses).variables} | {"gear": setup.drive.transmission}
-
-
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the energy."""
     findings = EnergyFindings.of_study(study.findings)
-    x, years = (
-        cited(findings, "findings.energy"),
-        exact(cited(study.setup.config.table("usage"), "given.usage").years),
-    )
+    x = cited(findings, "findings.energy")
+    years = exact(cited(study.setup.config.table("usage"), "given.usage").years)
     yield b.Text(_lead(findings, x))
     if (motor_class := MotorClass.found_in(study.findings)) is not None:
         yield b.Text(words_of(motor_class))
-    titles = _titles(study.setup)
+    # the parts between motor and machine have their noun
+    titles = {v.name: v.template for v in Layout(Losses).variables} | {"gear": study.setup.drive.transmission}
     yield _places(findings, x, titles)
     yield _figure(findings, titles)
     yield _year(findings, x, years)
@@ -43,6 +37,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _lead(findings: EnergyFindings, x: EnergyFindings) -> Line:
+    """Mean power, energy, cost and CO2 of a year, as far as they are known, and the temperature of the winding."""
     text, year, shown = "The drive takes {} in the mean, {} in a year of {}", findings.own.year, x.own.year
     sizes = [number(x.own.mean.electric), number(shown.energy), number(x.running)]
     if year.energy_per_tonne is not None:
@@ -57,10 +52,12 @@ def _lead(findings: EnergyFindings, x: EnergyFindings) -> Line:
 
 
 def _known(findings: EnergyFindings) -> list[str]:
+    """The names of the powers that are known."""
     return [name for name in PLACES if getattr(findings.own.mean, name) is not None]
 
 
 def _places(findings: EnergyFindings, x: EnergyFindings, titles: Mapping[str, str]) -> b.Table:
+    """A row for each power, from electric to the machine; a column for the mean and for each load."""
     columns = [x.own.mean, *(load.losses for load in x.loads.values())]
     rows = [
         b.TableRow((titles[name], *(number(getattr(losses, name)) for losses in columns)))
@@ -74,6 +71,7 @@ def _places(findings: EnergyFindings, x: EnergyFindings, titles: Mapping[str, st
 
 
 def _year(findings: EnergyFindings, x: EnergyFindings, years: Number) -> b.Table:
+    """The numbers of a year for the motor of the study and, if there is one, the other motor."""
     motors = list(filter(None, (findings.own, findings.other)))
     shown = list(filter(None, (x.own, x.other)))
     rows = [
@@ -110,6 +108,7 @@ def verdict(comparison: MotorComparison, x: MotorComparison, years: Number) -> L
 
 
 def _figure(findings: EnergyFindings, titles: Mapping[str, str]) -> fig.Figure:
+    """Bars of the mean power by place."""
     names, mean = _known(findings), findings.own.mean
     sizes = [float(getattr(mean, name)) for name in names]
     y = fig.Axis("", names=tuple(titles[name] for name in names))

@@ -171,5 +171,5 @@ def _machine(w: Window, feed: Any) -> dict[str, float]:
         motion = {"phi": crank_angle(drive, run) * drive.ratio, "w": crank_speed(drive, run) * drive.ratio}
         return smooth.evaluate({**motion, **values})["dissipated_power"]
 
-    taken = w.mean(processing)
-    return {"joints": whole - taken, "processing": taken}
+    processing_power = w.mean(processing)
+    return {"joints": whole - processing_power, "processing": processing_power}

@@ -155,6 +155,7 @@ class FlywheelAnalysis(Analysis):
         sizes = sorted({table.J, *config.plans["flywheels"]})
 
         def run(flywheel: float) -> Wheel:
+            """Run the drive with a flywheel of this inertia [kg m2]."""
             finished = float(len(findings.wheels))
             work.progress(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
             return _run(study.setup, work.rig, findings, flywheel)
@@ -206,21 +207,23 @@ def _wheel(
 ) -> Wheel:
     """A flywheel with its answers; a machine that stands or creeps has no answers of steady running."""
     turning = steady.speed_mean > CREEPS * setup.config.run.crank_speed
-    drive, motor_ripple = setup.drive, None
+    drive, motor_ripple, by_hand = setup.drive, None, findings.by_hand(flywheel)
     if drive.line and turning:
-        motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
-    numbers = {
+        w = turns[drive.motor_speed].values
+        motor_ripple = float(np.ptp(w) / np.mean(w))
+    further = {
         "flywheel": flywheel,
         "inertia": findings.inertia(flywheel),
         "start_time": start.start_time,
         # the formula does not hold for a ripple of more than 2
-        "by_hand": by_hand if (by_hand := findings.by_hand(flywheel)) < 2.0 else None,
+        "by_hand": by_hand if by_hand < 2.0 else None,
         "motor_ripple": motor_ripple,
         "residual": residual,
     }
-    names = Layout(FlywheelAnswers).names
-    values = {name: numbers.get(name, getattr(steady, name, None) if turning else None) for name in names}
-    answers = FlywheelAnswers(**values)
+    measures = set(Layout(FlywheelAnswers).names) - set(further)
+    answers = FlywheelAnswers(
+        **further, **{name: getattr(steady, name) if turning else None for name in measures}
+    )
     checks = given_motor(
         drive,
         setup.config.plate,
@@ -440,24 +443,16 @@ def _limit(wheel: Wheel, name: str, setup: StudySetup) -> str:
 
 def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn where the flywheel of the study, or every flywheel, does not keep the permitted fluctuation."""
-    limit = number(findings.permitted_fluctuation, "1", "percent")
-    study_wheel = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
-    if (
-        study_wheel is not None
-        and study_wheel.answers.speed_ripple is not None
-        and study_wheel.answers.speed_ripple > findings.permitted_fluctuation
-    ):
+    permitted = findings.permitted_fluctuation
+    wheel = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
+    ripple = None if wheel is None else wheel.answers.speed_ripple
+    if wheel is not None and ripple is not None and ripple > permitted:
         study.findings.say(
-            _FLUCTUATION,
-            STEADY,
-            speed_ripple=study_wheel.answers.speed_ripple,
-            flywheel=study_wheel.flywheel,
-            permitted=findings.permitted_fluctuation,
+            _FLUCTUATION, STEADY, speed_ripple=ripple, flywheel=wheel.flywheel, permitted=permitted
         )
     # flywheels without a run are not judged
-    if findings.is_searched and not any(
-        wheel.keeps(findings.permitted_fluctuation) for wheel in findings.wheels
-    ):
+    if findings.is_searched and not any(wheel.keeps(permitted) for wheel in findings.wheels):
+        limit = number(permitted, "1", "percent")
         study.findings.say(_NONE_KEEPS, limit=limit, larger="" if findings.least is None else None)
         _on_line(findings, study)
     _on_heavier(findings, study)
@@ -466,8 +461,7 @@ def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
-    """Warn where the motor runs evenly enough and the crank does not: the ripple is made behind the
-    flywheel."""
+    """Warn where the motor runs evenly enough and the crank does not: the ripple is made behind the flywheel."""
     ripples = [(wheel, wheel.answers.motor_ripple) for wheel in findings.wheels]
     even = [
         wheel for wheel, ripple in ripples if ripple is not None and ripple <= findings.permitted_fluctuation

@@ -58,47 +58,40 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _table(setup: StudySetup, findings: FlywheelFindings) -> b.Table:
+    """A row for each flywheel, with the answers that any of them has."""
     x = cited(findings, PATH)
-    rows = [(remark, cited(wheel.answers, path)) for remark, wheel, path in findings.rows]
+    all_answers = [wheel.answers for _, wheel, _ in findings.rows]
     columns = [
         v
         for v in Layout(FlywheelAnswers).variables
-        if v.name in _HEADS
-        and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in findings.rows)
+        if v.name in _HEADS and any(getattr(answers, v.name) is not None for answers in all_answers)
     ]
+    rows = []
+    for remark, wheel, path in findings.rows:
+        answers = cited(wheel.answers, path)
+        numbers = (number(getattr(answers, v.name), none="-") for v in columns)
+        rows.append(b.TableRow((line(number(answers.flywheel), f" ({remark})" if remark else ""), *numbers)))
     heads = (b.Column(v.described(setup.driver_noun), _HEADS[v.name]) for v in columns)
+    shaft = setup.drive.flywheel_shaft.words(setup.driver_noun)
+    title = f"Flywheels on the {shaft}; permitted ripple of the speed "
     return b.Table(
-        tuple(
-            b.TableRow(
-                (
-                    line(number(answers.flywheel), f" ({remark})" if remark else ""),
-                    *(number(getattr(answers, v.name), none="-") for v in columns),
-                )
-            )
-            for remark, answers in rows
-        ),
-        (b.Column("flywheel"), *heads),
-        title=line(
-            f"Flywheels on the {setup.drive.flywheel_shaft.words(setup.driver_noun)}; permitted ripple of the speed ",
-            exact(x.permitted_fluctuation),
-        ),
+        tuple(rows), (b.Column("flywheel"), *heads), title=line(title, exact(x.permitted_fluctuation))
     )
 
 
 def _figure(setup: StudySetup, findings: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
+    """Speed, torque and current over the last turn with each flywheel, and the ripple over the inertia."""
     drive, plate = setup.drive, setup.config.plate
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
-    some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
-    speed, torque, current = (
-        fig.Axis(f"{setup.driver_noun} speed", "rad/s", "speed"),
-        fig.Axis("motor torque, air gap", "N.m"),
-        fig.Axis("motor current", "A"),
-    )
+    count = min(len(running), len(LINES))
+    wheels = [running[round(k)] for k in np.linspace(0, len(running) - 1, count)]
+    speed = fig.Axis(f"{setup.driver_noun} speed", "rad/s", "speed")
+    torque, current = fig.Axis("motor torque, air gap", "N.m"), fig.Axis("motor current", "A")
     items: dict[fig.Axis, list[fig.Item]] = {speed: [], torque: [], current: []}
     if plate is not None:
         items[torque].append(fig.Mark(plate.nameplate.torque, "rated", axis="y", look="reference"))
         items[current].append(fig.Mark(plate.nameplate.rated_current, "rated", axis="y", look="reference"))
-    for look, wheel in enumerate(some):
+    for look, wheel in enumerate(wheels):
         run = wheel.turns
         angle, w = crank_motion(drive, run)
         series = {

@@ -65,6 +65,7 @@ def handover_report(handover: Handover) -> b.Report:
 
 
 def _opening(x: HandedDrive) -> Iterator[b.Block]:
+    """The known values of the drive in a table, and their number."""
     rows = tuple(
         b.TableRow((Name(name), value if isinstance(value, str) else number(value, 5)))
         for name, value in by_name(x.parts)
@@ -76,6 +77,7 @@ def _opening(x: HandedDrive) -> Iterator[b.Block]:
 
 
 def _left_open(sizing: HandedDrive) -> Iterator[b.Block]:
+    """The names of the values that the study does not know."""
     if not sizing.open:
         yield b.Text("Every value of sizing.json is known.")
         return

@@ -75,6 +75,7 @@ class StudiedDrive(NamedTuple):
         return next((row for row in self.rows("sizing/parts/parts") if row.get("part") == kind), {})
 
     def _entry(self, path: str) -> Any:
+        """The entry of result.json at a path such as ``sizing/candidates/0/gear``; None where there is none."""
         node: Any = self.result.data
         for name in path.split("/"):
             if isinstance(node, list):

@@ -99,6 +99,7 @@ def _csv(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def _cell(text: str) -> str:
+    """A text in one line; an apostrophe before one that a program for tables would compute."""
     text = re.sub(r"[\t\r\n]+", " ", text)
     if not _FORMULA.match(text):
         return text

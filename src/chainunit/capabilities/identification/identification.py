@@ -108,18 +108,13 @@ class IdentifiedMachine:
                 for u, x, _ in marginals
             }
         determined = {d.name: d.is_determined for d in self.information_at_fit.determinations}
-        return {
-            u.name: FittedNumber(
-                u,
-                float(x),
-                m.value,
-                m.deviation,
-                m.low,
-                m.high,
-                determined[m.name] and not _bound_of(u, float(x)),
+        estimates = {}
+        for u, x, m in marginals:
+            is_determined = determined[m.name] and not _bound_of(u, float(x))
+            estimates[u.name] = FittedNumber(
+                u, float(x), m.value, m.deviation, m.low, m.high, is_determined=is_determined
             )
-            for u, x, m in marginals
-        }
+        return estimates
 
     @property
     def covariance(self) -> Any:

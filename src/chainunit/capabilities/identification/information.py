@@ -73,11 +73,13 @@ class Combination:
     deviation: float
 
     def __str__(self) -> str:
-        first, *others = self.terms
-        rest = "".join(
-            f" {'+' if c > 0.0 else '-'} {_factor(abs(c))}{short_name(name)}" for name, c in others
-        )
-        return short_name(first[0]) + rest
+        """The sum as a formula: ``pin.friction - 0.5 crank.m``."""
+        (first, _), *others = self.terms
+        text = short_name(first)
+        for name, coefficient in others:
+            size = abs(coefficient)
+            text += f" {'+' if coefficient > 0.0 else '-'} {f'{size:.7g} ' if size != 1.0 else ''}{short_name(name)}"
+        return text
 
 
 @result
@@ -134,34 +136,31 @@ def _covariance(problem: Problem, fisher: Any, wider: float) -> Any:
 
 
 def _determinations(problem: Problem, fisher: Any) -> tuple[Determination, ...]:
-    alone, both = (np.sqrt(np.diag(_covariance(problem, fisher, x))) for x in (WEAK, 1.0))
+    """The standard deviations of each sought number: by its prior, by the runs alone, and by both."""
+    by_runs, by_both = (np.sqrt(np.diag(_covariance(problem, fisher, wider))) for wider in (WEAK, 1.0))
     return tuple(
-        Determination(u.name, u.unit, u.prior_deviation, float(a), float(k))
-        for u, a, k in zip(problem.sought, alone, both, strict=True)
+        Determination(u.name, u.unit, u.prior_deviation, float(by_runs[k]), float(by_both[k]))
+        for k, u in enumerate(problem.sought)
     )
 
 
 def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
-    """For each number that is not determined, the sum with the fewest others that is."""
-    covariance, both = (_covariance(problem, fisher, wider) for wider in (WEAK, 1.0))
+    """For each number that the runs alone (priors wider by `WEAK`) do not determine, the sum with the fewest others
+    that they do: others are added one at a time, each time the one that leaves the least variance."""
+    by_runs, by_both = (_covariance(problem, fisher, wider) for wider in (WEAK, 1.0))
     sought, sums = problem.sought, dict[frozenset[str], Combination]()
     for first, unknown in enumerate(sought):
-        if math.sqrt(covariance[first, first]) < DETERMINED * unknown.prior_deviation:
+        if math.sqrt(by_runs[first, first]) < DETERMINED * unknown.prior_deviation:
             continue
         others: list[int] = []
-        while len(others) < MOST_TERMS - 1:
-            left = set(range(len(sought))) - {first, *others}
-            if not left:
-                break
-            others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
-            deviation = math.sqrt(_rest(covariance, first, others))
-            if deviation < SHARP * unknown.prior_deviation:
-                factors, deviation = _factors(covariance, both, first, others)
+        while len(others) < MOST_TERMS - 1 and (left := set(range(len(sought))) - {first, *others}):
+            others.append(min(left, key=lambda k: _rest(by_runs, first, [*others, k])))
+            if math.sqrt(_rest(by_runs, first, others)) < SHARP * unknown.prior_deviation:
+                factors, deviation = _factors(by_runs, by_both, first, others)
                 names = [sought[k].name for k in others]
                 terms = ((unknown.name, 1.0), *zip(names, factors, strict=True))
-                sums.setdefault(
-                    frozenset((unknown.name, *names)), Combination(terms, unknown.unit, deviation)
-                )
+                combination = Combination(terms, unknown.unit, deviation)
+                sums.setdefault(frozenset((unknown.name, *names)), combination)
                 break
     return tuple(sums.values())
 
@@ -217,14 +216,15 @@ def _null_space(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
 def _rest(covariance: Any, first: int, others: Sequence[int]) -> float:
     """The variance of a number that remains if the others were known."""
     cross = covariance[np.ix_(others, [first])][:, 0]
-    rest = covariance[first, first] - cross @ np.linalg.solve(covariance[np.ix_(others, others)], cross)
-    return max(float(rest), 0.0)
+    variance = covariance[first, first] - cross @ np.linalg.solve(covariance[np.ix_(others, others)], cross)
+    return max(float(variance), 0.0)
 
 
 def _proposals(
     problem: Problem, z: Any, fisher: Any, now: Sequence[Determination], workers: int
 ) -> Iterator[Proposal]:
-    """Further runs, the best first."""
+    """Further runs, the best first: for each the information of all runs with it (`then`), beside the present one
+    (`now`). A run is simulated with thinned rows."""
     ranked = []
     for title, run in _candidates(problem):
         more = Problem(problem.plant, (*problem.runs, run), problem.sought, problem.sensors)
@@ -232,21 +232,17 @@ def _proposals(
         for name, place in problem.place.items():
             point[more.place[name]] = z[place]
         sparse, scales = _sparse(problem, run)
-        single = Problem(
-            problem.plant, (_simulated(more, sparse, point, workers),), problem.sought, problem.sensors
-        )
-        single_fisher = normal_equations(
-            single, np.array([point[more.place[name]] for name in single.place]), workers, scales
-        ).fisher
+        simulated = _simulated(more, sparse, point, workers)
+        single = Problem(problem.plant, (simulated,), problem.sought, problem.sensors)
+        single_point = np.array([point[more.place[name]] for name in single.place])
+        single_fisher = normal_equations(single, single_point, workers, scales).fisher
         total = np.zeros((len(point), len(point)))
         for of_runs, matrix in ((problem, fisher), (single, single_fisher)):
             places = [more.place[name] for name in of_runs.place]
             total[np.ix_(places, places)] += matrix
         then = _determinations(more, total)
         factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))
-        ranked.append(
-            Proposal(title, float(factor), sum(determination.is_determined for determination in then))
-        )
+        ranked.append(Proposal(title, float(factor), sum(x.is_determined for x in then)))
     yield from sorted(ranked, key=lambda proposal: -proposal.factor)
 
 
@@ -255,10 +251,10 @@ def _sparse(problem: Problem, run: RecordedRun) -> tuple[RecordedRun, dict[tuple
     several."""
     step = min(SPARSE, 2.0 * math.pi / (SPARSE_ROWS * run.crank_speed))
     (sparse,) = Problem(problem.plant, (run,), problem.sought, problem.sensors).thinned(step).runs
-    every = sparse.recording.step / run.recording.step
+    thinning = sparse.recording.step / run.recording.step
     # the instant of a mark is known up to the time between two rows
     return sparse, {
-        (run.name, name): 1.0 / every if name == "mark" else 1.0 / math.sqrt(every)
+        (run.name, name): 1.0 / thinning if name == "mark" else 1.0 / math.sqrt(thinning)
         for name in run.recording.columns
     }
 
@@ -287,16 +283,16 @@ def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
 
 
 def _other_speeds(problem: Problem, further: RecordedRun) -> Iterator[tuple[str, RecordedRun]]:
-    """The run at other speeds, and at a speed that changes."""
+    """The run at other speeds, and at a speed that changes; without speeds, to 5 %, and changes that the runs
+    have."""
     w, references = float(further.values[REFERENCE]), [run.values.get(REFERENCE, 0.0) for run in problem.runs]
+    first_speeds = [x.start if isinstance(x, Profile) else x for x in references]
     for share in OTHER_SPEEDS:
-        if not any(abs(getattr(x, "start", x) - share * w) < 0.05 * w for x in references):
+        if not any(abs(speed - share * w) < 0.05 * w for speed in first_speeds):
             values = {**further.values, REFERENCE: share * w}
-            yield (
-                f"at {share:g} times the speed",
-                replace(further, values=values, crank_speed=share * further.crank_speed),
-            )
-    if not any(hasattr(x, "changes") for x in references):
+            run = replace(further, values=values, crank_speed=share * further.crank_speed)
+            yield f"at {share:g} times the speed", run
+    if not any(isinstance(x, Profile) for x in references):
         time = further.recording.time
         begins = np.arange(float(time[0]), float(time[-1]), SHAKING)[:MOST_CHANGES]
         changes = tuple((float(t), 0.5 * SHAKING, w * SHAKEN[k % 2]) for k, t in enumerate(begins))
@@ -323,7 +319,3 @@ def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> Reco
 def short_name(name: str) -> str:
     """A name of the system without that of the machine."""
     return name.removeprefix("machine.")
-
-
-def _factor(x: float) -> str:
-    return "" if x == 1.0 else f"{x:.7g} "

@@ -77,6 +77,7 @@ TASK: Task[Config, IdentifiedMachine] = Task(
 
 
 def _opening(x: IdentificationSummary, machine: IdentifiedMachine) -> Iterator[b.Block]:
+    """Whether the model describes the recordings, and how many numbers these determine."""
     if machine.is_described:
         sentence = (
             "The model describes the recordings: their residuals are noise. These recordings determine {} of {} "
@@ -93,6 +94,7 @@ def _opening(x: IdentificationSummary, machine: IdentifiedMachine) -> Iterator[b
 
 
 def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
+    """The sets of known numbers that would explain the recordings, if they were wrong."""
     rows = [
         (i, suspected.describes, suspect)
         for i, suspected in enumerate(x.suspects, 1)
@@ -121,6 +123,7 @@ def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _numbers(x: IdentificationSummary) -> Iterator[b.Block]:
+    """The sought numbers before and after the recordings, or else the suspects."""
     if not x.is_described:
         yield from _suspects(x)
 
@@ -165,6 +168,7 @@ def _meaning() -> b.Text:
 
 
 def _limits(x: IdentificationSummary) -> Iterator[b.Block]:
+    """Changes that leave no trace, sums that are determined, and further runs that would tell more."""
     for change in x.blind:
         yield b.Judgement("partly", line("No trace in any column: ", change.text, "."))
     yield from table(
@@ -191,6 +195,7 @@ def _limits(x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _residuals(x: IdentificationSummary) -> Iterator[b.Block]:
+    """The tests of the residuals of each column."""
     yield from table(
         x.residuals,
         ("column", lambda residual: line(as_name(residual.run), " ", as_name(residual.column))),
@@ -219,6 +224,7 @@ def _residuals(x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _figures(machine: IdentifiedMachine, summary: IdentificationSummary) -> Iterator[b.Block]:
+    """For each run its measured and simulated columns, over the angle or over time."""
     for run, file in zip(machine.plan.runs, pictures(machine), strict=True):
         panels = []
         steady = machine.is_steady(run.name)
@@ -249,6 +255,7 @@ def _figures(machine: IdentifiedMachine, summary: IdentificationSummary) -> Iter
 
 
 def _runs(x: IdentificationSummary) -> Iterator[b.Block]:
+    """A row for each run with its recording."""
     yield from table(
         x.runs.items(),
         ("run", lambda row: Name(row[0])),

@@ -154,29 +154,31 @@ class _CurvedDensity:
         follow = covariance[:, :count] @ np.linalg.inv(covariance[:count, :count])
         ridges = follow @ (spread[:count, None] * directions) * np.sqrt(sizes)
         self._across = ridges[:, wide]
-        rest = [k for k in range(count) if k not in wide]
-        self._along = np.hstack([ridges[:, rest], np.eye(size)[:, count:] * spread[count:]])
+        narrow = [k for k in range(count) if k not in wide]
+        self._along = np.hstack([ridges[:, narrow], np.eye(size)[:, count:] * spread[count:]])
         self._pairs = list(itertools.combinations_with_replacement(range(len(wide)), 2))
         self._reduce(best, workers, stiff)
 
     def _reduce(self, best: NormalEquations, workers: int, stiff: Any) -> None:
-        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b. Numbers
-        of active bounds have a further, `stiff` information."""
+        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b: a form of the
+        first three, and b as a normal distribution with a mean that is linear in them. Numbers of active bounds have
+        a further, `stiff` information."""
         problem = self._problem
         even = np.array([u.is_even for u in problem.unknowns])
         priors = np.where(even, 0.0, 1.0 / problem.prior_deviations**2) + stiff
         wide, pairs = self._across.shape[1], len(self._pairs)
         basis = np.hstack([self._across, self._along])
+        # the places of a and b in the form
         linear = 1 + np.r_[0:wide, wide + pairs : wide + pairs + self._along.shape[1]]
         matrix = np.zeros((1 + wide + pairs + self._along.shape[1],) * 2)
         matrix += self._squares(best, workers, linear)
         matrix[np.ix_(linear, linear)] += basis.T @ (priors[:, None] * basis)
         # the gradient is that of all rows; without the pull of a prior where there are bounds alone
         matrix[0, linear] = matrix[linear, 0] = -basis.T @ np.where(stiff > 0.0, 0.0, _score(problem, best))
-        places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
-        inner = matrix[places[1], places[1]]
-        mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
-        self._form = matrix[places[0], places[0]] + matrix[places[0], places[1]] @ mean
+        kept, of_b = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
+        inner = matrix[of_b, of_b]
+        mean = -np.linalg.solve(inner, matrix[of_b, kept])
+        self._form = matrix[kept, kept] + matrix[kept, of_b] @ mean
         # of `b`, only the share in the sought numbers is sampled
         along = self._along[: len(problem.sought)]
         self._mean = along @ mean
@@ -195,22 +197,22 @@ class _CurvedDensity:
             ahead, behind = (_largest_factor(best.z, sign * step, low, high) for sign in (1.0, -1.0))
             size = max(min(ahead, 1.0), 0.1) if ahead >= behind else -max(min(behind, 1.0), 0.1)
             size, moved = _moved(problem, best.z, step, size, workers)
-            for n, (here, there) in enumerate(zip(base, moved, strict=True)):
-                seconds[n, k] = (there.slopes - here.slopes) @ self._across[list(here.places)] / size
+            for n, (at_best, beyond) in enumerate(zip(base, moved, strict=True)):
+                seconds[n, k] = (beyond.slopes - at_best.slopes) @ self._across[list(at_best.places)] / size
         total = np.zeros((1 + wide + len(self._pairs) + self._along.shape[1],) * 2)
-        for here, second, full in zip(base, seconds, best.comparisons, strict=True):
-            table = np.zeros((len(here.slopes), len(total)))
-            table[:, linear] = here.slopes @ basis[list(here.places)]
+        for at_best, second, full in zip(base, seconds, best.comparisons, strict=True):
+            table = np.zeros((len(at_best.slopes), len(total)))
+            table[:, linear] = at_best.slopes @ basis[list(at_best.places)]
             for n, (i, j) in enumerate(self._pairs):
                 # half of the second derivative; of a mixed one, the mean of both
                 table[:, 1 + wide + n] = 0.5 * (second[i][:, j] + (second[j][:, i] if i != j else 0.0))
             # in the thinned columns, the sizes of the noise are others by a trifle
-            table *= best.weights[here.run, here.column] * here.size / full.size
+            table *= best.weights[at_best.run, at_best.column] * at_best.size / full.size
             edges = np.linspace(0, len(full.residuals), len(table) + 1).round().astype(int)
             rows = np.diff(edges)
             # where a bound holds a number, the residuals have a part along the second derivatives
-            left = np.add.reduceat(np.clip(full.residuals, -OUTLIER, OUTLIER), edges[:-1])
-            total[0] -= best.weights[here.run, here.column] * (left @ table)
+            sums = np.add.reduceat(np.clip(full.residuals, -OUTLIER, OUTLIER), edges[:-1])
+            total[0] -= best.weights[at_best.run, at_best.column] * (sums @ table)
             total += np.mean(rows) * (table.T @ table)
         # those along the first derivatives are in the gradient
         total[1:, 0] = total[0, 1:]
@@ -243,18 +245,18 @@ class _CurvedDensity:
             return self._draw(np.zeros((CHAINS * KEPT, 0)), rng)[1]
         a = rng.standard_normal((CHAINS, wide))
         density, z = self._draw(a, rng)
-        kept = []
+        samples = []
         for step in range(STEPS):
             others = np.array([rng.permutation(CHAINS) for _ in range(2)])
             jump = 1.0 if step % 10 == 9 else 1.7 / math.sqrt(2.0 * wide)
             tried = a + jump * (a[others[0]] - a[others[1]]) + 1e-3 * rng.standard_normal(a.shape)
-            new, there = self._draw(tried, rng)
-            taken = np.log(rng.random(CHAINS)) < new - density
-            a, z = np.where(taken[:, None], tried, a), np.where(taken[:, None], there, z)
-            density = np.where(taken, new, density)
+            new, new_z = self._draw(tried, rng)
+            accepted = np.log(rng.random(CHAINS)) < new - density
+            a, z = np.where(accepted[:, None], tried, a), np.where(accepted[:, None], new_z, z)
+            density = np.where(accepted, new, density)
             if step >= STEPS // 2 and (step + 1) % (STEPS // 2 // KEPT) == 0:
-                kept.append(z)
-        return np.concatenate(kept)
+                samples.append(z)
+        return np.concatenate(samples)
 
 
 def _moved(problem: Problem, z: Any, step: Any, size: float, workers: int) -> tuple[float, list[Comparison]]:

@@ -94,6 +94,7 @@ def read_identification(
     faults = Faults()
 
     def read_run(entry: Entry, name: str) -> PlannedRun:
+        """A run; an amount may be added to sought numbers alone."""
         run = _run(entry, name, crank_speed, numbers, source)
         for other in sorted(run.added.keys() - sought.keys()) if not faults.errors else ():
             entry.fault(f"added.{other}", "is not sought; add [[identify.parameter]] with this name")
@@ -110,23 +111,21 @@ def read_identification(
     sensors = SENSORS.read(form.sensor, faults, lambda entry, column: _sensor(entry, column, table), _ANALOG)
     faults.refuse()
     return IdentificationPlan(
-        tuple(sought.values()),
-        {name: numbers[name][0] for name in sought},
-        tuple(runs.values()),
-        sensors,
-        SensorKnowledge(float(table.noise), float(table.gain)),
-        int(table.starts),
-        int(table.seed),
+        sought=tuple(sought.values()),
+        variables={name: numbers[name][0] for name in sought},
+        runs=tuple(runs.values()),
+        sensors=sensors,
+        usual=SensorKnowledge(float(table.noise), float(table.gain)),
+        starts=int(table.starts),
+        seed=int(table.seed),
     )
 
 
 def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknown:
     """A sought number, with its bounds and its prior."""
     content, q, place = entry.given, variable.quantity, entry.place
-    low, high = (
-        entry.quantity(end, variable, content[end]) if end in content else bound
-        for end, bound in (("from", q.low), ("to", q.high))
-    )
+    low = entry.quantity("from", variable, content["from"]) if "from" in content else q.low
+    high = entry.quantity("to", variable, content["to"]) if "to" in content else q.high
     entry.refuse()
     unit = unit_behind(variable.unit)
     if not low < high:

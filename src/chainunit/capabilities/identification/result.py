@@ -159,6 +159,7 @@ def summary_of(machine: IdentifiedMachine) -> IdentificationSummary:
 
 
 def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
+    """All that the report and result.json say of an identification."""
     best, estimates, start = machine.best, machine.estimates, machine.information_at_start
     return IdentificationSummary(
         heading=Heading.of(machine.config.title, machine.config.file),
@@ -249,6 +250,7 @@ def _correlations(machine: IdentifiedMachine) -> Iterator[Correlation]:
 
 
 def _sum(machine: IdentifiedMachine, combination: Combination) -> DeterminedSum:
+    """A sum of sought numbers with its value."""
     # of temperatures, a sum is no temperature
     value, deviation = (difference(x, combination.unit) for x in machine.value_of_sum(combination))
     return DeterminedSum(str(combination), dict(combination.terms), value, deviation)
@@ -282,10 +284,10 @@ def _courses(machine: IdentifiedMachine, run: str) -> dict[str, dict[str, InUnit
         edges = np.linspace(ends[0], ends[1], (CLASSES if steady else CLASSES_OF_TIME) + 1)
         place, size = np.digitize(x, edges[1:-1]), len(edges) - 1
         count = np.bincount(place, minlength=size)
-        some = count > 0
-        means = [np.bincount(place, y, size)[some] / count[some] for y in (measured, simulated)]
+        filled = count > 0
+        means = [np.bincount(place, y, size)[filled] / count[filled] for y in (measured, simulated)]
         unit = MEASURANDS[comparison.column].unit
-        middle = 0.5 * (edges[1:] + edges[:-1])[some]
+        middle = 0.5 * (edges[1:] + edges[:-1])[filled]
         courses[comparison.column] = {
             "angle" if steady else "time": InUnit(middle, "rad" if steady else "s"),
             "measured": InUnit(means[0], unit),

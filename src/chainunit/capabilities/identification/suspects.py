@@ -201,22 +201,18 @@ class _Search:
         freed = self._best_freed()
         ranked = freed.ranked()
         costs = {names: cost - ranked[0][1] for names, cost in ranked}
+        best_sets = list(costs)
         if any(self._describes(names) for names in self._fits):
-            # the form is that of small changes: what it holds for near is fitted
+            # the form is that of small changes: sets that it holds for about as good are fitted
             enough = [names for names, cost in costs.items() if cost < MARGIN]
-            near = [
-                names
-                for names, cost in _sorted(costs)
-                if cost < NEARLY * MARGIN and not any(other < names for other in enough)
-            ]
-            for names in near[:OTHERS]:
+            near = [names for names, cost in _sorted(costs) if cost < NEARLY * MARGIN]
+            candidates = [names for names in near if not any(other < names for other in enough)]
+            for names in candidates[:OTHERS]:
                 self._fit_with(names, freed)
-            of_fits = self._costs()
-            costs = {names: of_fits.get(names, max(0.0, cost)) for names, cost in costs.items()}
-            kept = _smallest(names for names, cost in _sorted(costs) if cost < MARGIN)
-        else:
-            kept = list(costs)
-        for names in kept[:MOST_SETS]:
+            fit_costs = self._costs()
+            costs = {names: fit_costs.get(names, max(0.0, cost)) for names, cost in costs.items()}
+            best_sets = _smallest(names for names, cost in _sorted(costs) if cost < MARGIN)
+        for names in best_sets[:MOST_SETS]:
             yield self._set(names, freed, costs[names])
 
     def _costs(self) -> dict[frozenset[str], float]:
@@ -230,15 +226,16 @@ class _Search:
         return {names: cost - min(costs.values()) for names, cost in costs.items()}
 
     def _best_freed(self) -> _Freed:
-        """The known numbers, freed around the best fit with one or two of them."""
-        first = freed = self._freed_around(self._problem, self._best)
+        """The known numbers, freed around the best fit in which one or two of them are sought, too. The best sets are
+        fitted, and a new form around the best of these fits names the next ones; at most `SEARCHES` times."""
+        freed = self._freed_around(self._problem, self._best)
         for k in range(SEARCHES):
             ranked = [names for names, _ in freed.ranked()]
             if self._try(ranked, freed) or not self._fits:
                 break
             if k == 0:
                 # far from straight, the form shows a second number only after the first one is right
-                self._try([names for names in ranked if len(names) == 1], first)
+                self._try([names for names in ranked if len(names) == 1], freed)
             freed = self._freed_around(*self._fits[self._winner()])
         return self._freed_around(*self._fits[self._winner()]) if self._fits else freed
 
@@ -258,7 +255,11 @@ class _Search:
         return report
 
     def _winner(self) -> frozenset[str]:
-        return min(self._fits, key=lambda names: _cost(*self._fits[names]))
+        """The set whose fit has the least sum of squares with the stated noise of all sensors."""
+        costs = {
+            names: assemble(wider, fit.z, fit.comparisons).cost for names, (wider, fit) in self._fits.items()
+        }
+        return min(costs, key=costs.__getitem__)
 
     def _try(self, ranked: Sequence[frozenset[str]], freed: _Freed) -> bool:
         """Fit the recordings with the first of these sets that were not tried; whether the search has its end, as one
@@ -298,14 +299,12 @@ class _Search:
         if names in self._fits:
             wider, best = self._fits[names]
             values = {name: float(best.z[wider.place[name]]) for name in names}
-        numbers = {u.name: u for u in self._more}
         kinds = {v.name: v.kind for v, _ in self._problem.plant.parameters()}
-        suspects = (
-            Suspect(name, numbers[name].unit, kinds[name], numbers[name].start, x, name not in self._assumed)
-            for name, x in sorted(
-                values.items(), key=lambda item: -abs(item[1] / numbers[item[0]].start - 1.0)
-            )
-        )
+        suspects = []
+        for u in (u for u in self._more if u.name in names):
+            is_stated = u.name not in self._assumed
+            suspects.append(Suspect(u.name, u.unit, kinds[u.name], u.start, values[u.name], is_stated))
+        suspects.sort(key=lambda suspect: -abs(suspect.preferred / suspect.known - 1.0))
         return SuspectSet(tuple(suspects), excess, self._describes(names))
 
 
@@ -328,11 +327,6 @@ def _wider(problem: Problem, z: Any, more: Sequence[Unknown]) -> tuple[Problem, 
     for name, place in problem.place.items():
         values[wider.place[name]] = z[place]
     return wider, values
-
-
-def _cost(problem: Problem, best: Fit) -> float:
-    """The sum of squares of a fit with the stated noise of all sensors."""
-    return assemble(problem, best.z, best.comparisons).cost
 
 
 class _Freed:
@@ -366,18 +360,19 @@ class _Freed:
         return cls(wider, assemble(wider, z, tuple(wider.comparisons(z, workers)), scales), more)
 
     def tests(self) -> Iterator[ScoreTest]:
-        """Each number alone, with all other further numbers at their known values."""
+        """For each further number the change that a fit with it alone would make, and its standard deviation: all
+        other further numbers keep their known values, the sought ones are free."""
         for k, u in enumerate(self._more):
             information = float(self._form[k, k])
-            if information <= ROUNDING * self._alone[k]:
-                yield ScoreTest(u.name, u.unit, u.start, 0.0, math.inf)
-            else:
-                change = float(self._pull[k]) / information
-                yield ScoreTest(u.name, u.unit, u.start, change, 1.0 / math.sqrt(information))
+            change, deviation = 0.0, math.inf
+            # else the sought numbers can do all that this one does
+            if information > ROUNDING * self._alone[k]:
+                change, deviation = float(self._pull[k]) / information, 1.0 / math.sqrt(information)
+            yield ScoreTest(u.name, u.unit, u.start, change, deviation)
 
     def values(self, names: Collection[str]) -> dict[str, float]:
         """The best values of these numbers if all others are as known."""
-        places = self._places(names)
+        places = [k for k, name in enumerate(self._names) if name in names]
         changes = self._solution(places)[0]
         return {self._names[k]: self._more[k].start + float(x) for k, x in zip(places, changes, strict=True)}
 
@@ -386,8 +381,8 @@ class _Freed:
         values = self.values(names)
         pairs = zip(self._more, self._now, strict=True)
         steps = [values.get(u.name, u.start) - u.start - now for u, now in pairs]
-        alone, following = self._others
-        changes = alone - following @ np.array(steps)
+        steps_alone, following = self._others
+        changes = steps_alone - following @ np.array(steps)
         others = zip(self._free.items(), changes, strict=True)
         return {name: x + float(change) for (name, x), change in others} | values
 
@@ -397,9 +392,6 @@ class _Freed:
         sets = [(k,) for k in determined] + list(itertools.combinations(determined, 2))
         costs = [(frozenset(self._names[k] for k in places), self._solution(places)[1]) for places in sets]
         return sorted(costs, key=lambda item: item[1])
-
-    def _places(self, names: Collection[str]) -> tuple[int, ...]:
-        return tuple(k for k, name in enumerate(self._names) if name in names)
 
     def _solution(self, places: Sequence[int]) -> tuple[Any, float]:
         """The changes of some numbers from their known values with the least sum of squares, within their bounds, and
@@ -411,19 +403,17 @@ class _Freed:
         pull = self._pull[chosen] - form[chosen] @ step - self._prior[chosen] * self._now[chosen]
         matrix = form[np.ix_(chosen, chosen)] + np.diag(self._prior[chosen])
         changes = self._now[chosen] + np.linalg.solve(matrix, pull)
-        low, high = (
-            np.array([getattr(self._more[k], end) - self._more[k].start for k in chosen])
-            for end in ("low", "high")
-        )
-        changes = np.clip(changes, low, high)
+        lowest = np.array([self._more[k].low - self._more[k].start for k in chosen])
+        highest = np.array([self._more[k].high - self._more[k].start for k in chosen])
+        changes = np.clip(changes, lowest, highest)
         step[chosen] = changes - self._now[chosen]
         cost = step @ form @ step - 2.0 * self._pull @ step
         return changes, float(cost + np.sum(self._prior[chosen] * changes**2))
 
 
 def _law_test(problem: Problem, best: NormalEquations, workers: int) -> ScoreTest | None:
-    """The test of the law of friction; None for a machine without it, one with which it is sought, and one that does
-    not run or does not keep its phase with other laws."""
+    """The score test of the law of friction, with its slopes by secants to another law, and the sought numbers free.
+    None for a machine without the law, where it is sought, and where no other law runs and keeps its phase."""
     by_name = {v.name: (v, x) for v, x in problem.plant.parameters()}
     if LAW in problem.place or LAW not in by_name or not by_name[LAW][1]:
         return None
@@ -431,21 +421,24 @@ def _law_test(problem: Problem, best: NormalEquations, workers: int) -> ScoreTes
     secants = next(filter(None, (_secants(problem, best, f * x, workers) for f in OTHER_LAWS)), None)
     if secants is None:
         return None
+    other_x, other_comparisons = secants
+    # the row of the law in the normal equations: with the sought numbers, with itself, and its gradient
     cross, alone, pull = np.zeros(len(best.z)), 0.0, 0.0
-    other_x, others = secants
-    for here, there in zip(best.comparisons, others, strict=True):
-        weight = best.weights[here.run, here.column] ** 2
-        slope = (here.residuals - there.residuals) / (other_x - x)
-        r = np.abs(here.residuals) * math.sqrt(weight)
-        root = np.sqrt(OUTLIER / np.maximum(r, OUTLIER))
-        slope = slope * root
-        cross[list(here.places)] += weight * ((here.slopes * root[:, None]).T @ slope)
+    for best_fit, other_law in zip(best.comparisons, other_comparisons, strict=True):
+        weight = best.weights[best_fit.run, best_fit.column] ** 2
+        # outliers count less, as in the fit
+        deviations = np.abs(best_fit.residuals) * math.sqrt(weight)
+        root = np.sqrt(OUTLIER / np.maximum(deviations, OUTLIER))
+        slope = (best_fit.residuals - other_law.residuals) / (other_x - x) * root
+        cross[list(best_fit.places)] += weight * ((best_fit.slopes * root[:, None]).T @ slope)
         alone += weight * float(slope @ slope)
-        pull += weight * float(slope @ (root * here.residuals))
+        pull += weight * float(slope @ (root * best_fit.residuals))
+    # information on the law that the free sought numbers leave
     scale = 1.0 / np.sqrt(np.diag(best.matrix))
     solution: Any = np.linalg.solve(best.matrix * np.outer(scale, scale), scale * cross)
     information = alone - float(scale * cross @ solution)
     if information <= ROUNDING * alone:
+        # the sought numbers can do all that the law does: its deviation has no limit
         return ScoreTest(LAW, v.unit, x, 0.0, math.inf)
     change = (pull - float(solution @ (scale * best.gradient))) / information
     return ScoreTest(LAW, v.unit, x, change, 1.0 / math.sqrt(information))
@@ -454,8 +447,8 @@ def _law_test(problem: Problem, best: NormalEquations, workers: int) -> ScoreTes
 def _secants(
     problem: Problem, best: NormalEquations, x: float, workers: int
 ) -> tuple[float, tuple[Comparison, ...]] | None:
-    """The number of another law, and the comparisons with it; None where the machine does not run with it, or loses
-    its phase."""
+    """The value `x` of another law of friction, and the comparisons with it at the values of the best fit; None where
+    the machine does not run with it, or its angle departs by more than `NEAR` [rad]."""
     runs = [replace(run, values={**run.values, LAW: x}) for run in problem.runs]
     other = Problem(problem.plant, runs, problem.sought, problem.sensors)
     try:
@@ -463,5 +456,5 @@ def _secants(
     except RunError:
         return None
     pairs = zip(best.comparisons, comparisons, strict=True)
-    change = max(float(np.max(np.abs(there.angle - here.angle))) for here, there in pairs)
+    change = max(float(np.max(np.abs(other_law.angle - fitted.angle))) for fitted, other_law in pairs)
     return (x, comparisons) if change <= NEAR else None

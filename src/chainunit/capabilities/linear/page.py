@@ -40,6 +40,7 @@ def linear_report(findings: LinearResult) -> b.Report:
 
 
 def _opening(findings: LinearResult, x: LinearModel) -> Iterator[b.Block]:
+    """The model, the point, the numbers of states, inputs and outputs, and whether the point is stable."""
     linear = findings.linear
     sizes = ((linear.states, "state"), (linear.inputs, "input"), (linear.outputs, "output"))
     counts = join([f"{len(signals)} {name}{'' if len(signals) == 1 else 's'}" for signals, name in sizes])
@@ -57,6 +58,7 @@ def _opening(findings: LinearResult, x: LinearModel) -> Iterator[b.Block]:
 
 
 def _poles(x: LinearModel) -> Iterator[b.Table]:
+    """A row for each pole."""
     return table(
         x.poles,
         ("largest part in it", lambda pole: as_name(pole.state)),
@@ -70,18 +72,18 @@ def _poles(x: LinearModel) -> Iterator[b.Table]:
 
 
 def _bends(linear: LinearModel, x: LinearModel) -> Iterator[b.Block]:
+    """A warning of each input or state by which the slopes change near the point."""
     for bend, shown in zip(linear.bends, x.bends, strict=True):
         names, more = bend.rows[:_MOST_ROWS], len(bend.rows) - _MOST_ROWS
         rows = line(join(map(Name, names)), f" and {more} more" if more > 0 else "")
-        said = (
-            line("the slopes by it jump at this point; the matrices have those of one side: ")
-            if bend.kink
-            else line("the slopes by it bend within ", number(shown.within), " of this point: ")
-        )
-        yield b.Judgement("warning", line(Name(bend.by), ": ", said, rows, "."))
+        slopes = line("the slopes by it bend within ", number(shown.within), " of this point: ")
+        if bend.kink:
+            slopes = line("the slopes by it jump at this point; the matrices have those of one side: ")
+        yield b.Judgement("warning", line(Name(bend.by), ": ", slopes, rows, "."))
 
 
 def _point(x: LinearModel) -> Iterator[b.Block]:
+    """The values of states, inputs and outputs at the point."""
     value = ("value", lambda signal: number(signal.value, 6))
     head: tuple[Any, ...] = (
         ("name", lambda signal: as_name(signal.name)),
@@ -97,6 +99,7 @@ def _point(x: LinearModel) -> Iterator[b.Block]:
 
 
 def _responses(findings: LinearResult) -> Iterator[b.Block]:
+    """A Bode plot for each pair, or a sentence where nothing passes."""
     for k, response in enumerate(findings.responses):
         if np.any(response.gain > 0.0):
             yield _bode(k, response)
@@ -107,6 +110,7 @@ def _responses(findings: LinearResult) -> Iterator[b.Block]:
 
 
 def _bode(k: int, response: FrequencyResponse) -> fig.Figure:
+    """Gain and phase of a frequency response; `k` is its number."""
     low, high = float(response.frequency[0]), float(response.frequency[-1])
     frequency = fig.Axis("frequency", "rad/s", low=low, high=high, log=True)
     pair = f"{response.of} by {response.to}"

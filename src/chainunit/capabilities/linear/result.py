@@ -104,6 +104,7 @@ def frequencies(linear: LinearModel) -> np.ndarray:
 
 
 def _response(linear: LinearModel, to: str, output: str, frequency: np.ndarray) -> FrequencyResponse:
+    """The frequency response of an `output` to the input `to`."""
     above = linear.outputs[place("output", output, linear.outputs)].unit
     below = linear.inputs[place("input", to, linear.inputs)].unit
     values = linear.response(to, output, frequency)

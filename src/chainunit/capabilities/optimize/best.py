@@ -120,11 +120,11 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     if not good:
         progress("a machine that meets all limits", 0.0, 1.0)
         good, failure = _repaired(search, starts)
-    begun = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
+    base = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
     if not good:
         assert failure is not None
         closest = failure.nearest.x
-        return replace(begun, conflict=failure, found=_values(search, closest), pulls=_pulls(search, closest))
+        return replace(base, conflict=failure, found=_values(search, closest), pulls=_pulls(search, closest))
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
     if len(wishes.objectives) > 1:
@@ -135,7 +135,7 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     objective, limits = _checked(wishes, best, search)
     around = neighbours(search, best.x, objective, limits, search.value(objective, best.x))
     return replace(
-        begun,
+        base,
         answer=best,
         found=_values(search, best.x),
         pulls=_pulls(search, best.x),
@@ -156,6 +156,7 @@ def good_value(answers: Sequence[Answer]) -> float:
 def _from_starts(
     search: Search, starts: Sequence[Any], objective: CycleQuantity, progress: TaskProgress
 ) -> list[Answer]:
+    """The answer from each start, with the least value of the objective that it leads to."""
     answers = []
     for k, x in enumerate(starts):
         progress(f"starts, least {objective.name}", float(k), float(len(starts)))
@@ -165,18 +166,17 @@ def _from_starts(
 
 
 def _repaired(search: Search, starts: Sequence[Any]) -> tuple[list[Answer], Conflict | None]:
-    """Answers from machines that meet the limits, or the conflict."""
-    first, met = nearest(search, starts)
-    if met and first is not None:
-        objective = search.wishes.objectives[0]
-        answer = search.solve(first.x, objective)
-        if not answer.feasible:
-            # where the limits leave hardly any room, the machine that meets them is the answer
-            answer = replace(answer, x=first.x, value=search.value(objective, first.x), feasible=True)
-        return [answer], None
-    if first is None:
-        first = search.solve(search.base, None)
-    return [], conflict(search, starts[:_RETRIES], first)
+    """The answer of a search from the machine nearest to the limits, where no start led to one that meets them; where
+    this one does not meet them either, the conflict of the limits."""
+    near, met = nearest(search, starts)
+    if near is None or not met:
+        return [], conflict(search, starts[:_RETRIES], near or search.solve(search.base, None))
+    objective = search.wishes.objectives[0]
+    answer = search.solve(near.x, objective)
+    if not answer.feasible:
+        # where the limits leave hardly any room, the machine that meets them is the answer
+        answer = replace(answer, x=near.x, value=search.value(objective, near.x), feasible=True)
+    return [answer], None
 
 
 def _values(search: Search, x: Any) -> dict[str, float]:
@@ -192,10 +192,8 @@ def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
     parameters `x` [N], see `Best.pulls`; NaN where one does not turn."""
     if not search.wishes.slack_free_speed:
         return None
-    today, pull = (
-        search.least_pull(point) if search.turns(point) else math.nan for point in (search.today, x)
-    )
-    return today, pull
+    today, here = (search.least_pull(p) if search.turns(p) else math.nan for p in (search.today, x))
+    return today, here
 
 
 # -- two objectives
@@ -244,18 +242,16 @@ def _dominates(a: FrontPoint, b: FrontPoint) -> bool:
 
 
 def _compromise(search: Search, front: Sequence[FrontPoint]) -> Answer:
-    """The point of the front that is nearest to the least values of both, each as a share of its range; solved
-    again with the second objective limited to its value."""
+    """The point of the front that is nearest to the least values of both objectives, each counted over its range;
+    solved again for the first one, with the second one limited to its value there."""
     values = np.array([point.values for point in front])
     span = np.ptp(values, axis=0)
     shares = (values - np.min(values, axis=0)) / np.where(span > 0.0, span, 1.0)
     point = front[int(np.argmin(np.hypot(*shares.T)))]
     first, second = search.wishes.objectives
-    limits = [
-        *search.wishes.limits,
-        TurnLimit(second, None, point.values[1] * (1.0 + math.copysign(1e-9, point.values[1]))),
-    ]
-    answer = search.solve(point.x, first, limits)
+    # rounding must not forbid the point itself
+    highest = point.values[1] * (1.0 + math.copysign(1e-9, point.values[1]))
+    answer = search.solve(point.x, first, [*search.wishes.limits, TurnLimit(second, None, highest)])
     return answer if answer.feasible else replace(answer, x=point.x, value=point.values[0], feasible=True)
 
 
@@ -269,6 +265,7 @@ def _checked(wishes: Wishes, best: Answer, search: Search) -> tuple[CycleQuantit
 
 
 def _turns(wishes: Wishes, machine: Machine) -> dict[str, Any]:
+    """The crank torque over a turn of today's machine and of the best one."""
     today = cycle(wishes.machine, wishes.crank_speed, wishes.feed)
     then = cycle(machine, wishes.crank_speed, wishes.feed)
     return {"angle": today.angle, "today": today.crank_torque, "best": then.crank_torque}

@@ -17,7 +17,9 @@ from .wishes import TurnLimit
 STEPS = (1e-3, 1e-2)
 """Distances of the neighbours, as shares of the distance between the bounds."""
 _RANDOM = 64
+"""Number of random directions."""
 _TOLERANCE, _ROUNDING = 1e-7, 1e-11
+"""Shares by which a neighbour may exceed a limit, and has to be better: on a grid, and as computed exactly."""
 
 
 @result
@@ -64,13 +66,12 @@ def neighbours(
         met[met] = [search.least_pull(point) >= 0.0 for point in points[met]]
     better = met & (table[objective.name].values < value * (1.0 - math.copysign(_TOLERANCE, value)))
     # the values at the angles of a grid are a little too small: the candidates are computed exactly
-    candidates = np.flatnonzero(better)
-    # and a limit may be exceeded no more than at the best machine: a steep objective gains from any share
-    widened = (
-        [_widened(limit, search.value(limit.quantity, x)) for limit in limits] if len(candidates) else []
-    )
-    exact = [k for k in candidates if _is_better(search, points[k], objective, widened, value)]
-    return Neighbours(len(points), int(np.sum(met)), len(exact))
+    count = 0
+    if better.any():
+        # and a limit may be exceeded no more than at the best machine: a steep objective gains from any share
+        widened = [_widened(limit, search.value(limit.quantity, x)) for limit in limits]
+        count = sum(_is_better(search, point, objective, widened, value) for point in points[better])
+    return Neighbours(len(points), int(np.sum(met)), count)
 
 
 def _clear(search: Search, x: Any) -> bool:
@@ -86,6 +87,7 @@ def _widened(limit: TurnLimit, value: float) -> TurnLimit:
 
 
 def _meets(limit: TurnLimit, values: Any, tolerance: float = _TOLERANCE) -> Any:
+    """Whether each of the values keeps a limit, but for a share of it that is the `tolerance`."""
     met = np.isfinite(values)
     for bound, sign in ((limit.low, 1.0), (limit.high, -1.0)):
         if bound is not None:
@@ -96,6 +98,8 @@ def _meets(limit: TurnLimit, values: Any, tolerance: float = _TOLERANCE) -> Any:
 def _is_better(
     search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
 ) -> bool:
+    """Whether a machine is better than one with the objective `value`, and keeps the limits, both computed
+    exactly."""
     if not all(_meets(limit, np.array(search.value(limit.quantity, x)), _ROUNDING) for limit in limits):
         return False
     return search.value(objective, x) < value * (1.0 - math.copysign(_TOLERANCE, value))

@@ -68,8 +68,9 @@ class Columns:
         return self.pieces(column, "")[0]
 
     def pieces(self, column: str, choice: str) -> tuple[int, ...]:
-        """The numbers of the expressions whose least value (`choice` "FMIN") or largest value ("FMAX") a column is:
-        these are smooth where the column has kinks.
+        """The places of the expressions whose least value (`choice` "FMIN") or largest value ("FMAX") a column is:
+        these are smooth where the column has kinks. A column that is no such choice is one expression; an expression
+        gets its place when it is asked for first.
 
         Raises
         ------

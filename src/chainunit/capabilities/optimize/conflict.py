@@ -59,27 +59,26 @@ def conflict(search: Search, starts: Sequence[Any], first: Answer) -> Conflict:
     """All limits that cannot be met alone, and a smallest set of others that cannot be met together; `first` is the
     nearest machine under all limits."""
     wishes = search.wishes
-    names = [limit.name for limit in wishes.limits]
-    names += [SLACK] if wishes.slack_free_speed else []
-    names += [TURNS]
+    slack = [SLACK] if wishes.slack_free_speed else []
+    names = [*(limit.name for limit in wishes.limits), *slack, TURNS]
     # the nearest machine is the best start: a limit less moves it little
     starts = [first.x, *starts]
+    closest, alone = first, dict[str, float]()
     # a limit that the nearest machine meets is not impossible alone
-    missed = [name for name in names if first.misses.get(name, 0.0) > MET]
-    last, alone = first, {}
-    for name in missed:
-        answer, met = nearest(search, starts, frozenset(names) - {name})
+    for name in (name for name in names if first.misses.get(name, 0.0) > MET):
+        answer, met = nearest(search, starts, without=frozenset(names) - {name})
         if not met and answer is not None:
-            last, alone[name] = answer, _value(search, name, answer.x)
+            closest, alone[name] = answer, _value(search, name, answer.x)
     together: tuple[str, ...] = ()
-    out = frozenset(alone)
-    if not alone or not nearest(search, starts, out)[1]:
-        last, together = _together(search, starts, first, [name for name in names if name not in alone], out)
+    if not alone or not nearest(search, starts, without=frozenset(alone))[1]:
+        others = [name for name in names if name not in alone]
+        closest, together = _together(search, starts, first, others, frozenset(alone))
     if len(alone) > 1 or (alone and together):
-        answer, _ = nearest(search, starts, frozenset(names) - {*alone, *together})
-        last = answer or first
-    bounds = tuple(key for key, factor in last.at_bounds.items() if abs(factor) > _HELD)
-    return Conflict(alone, together, last, bounds)
+        # the nearest machine under all limits of the conflict
+        answer, _ = nearest(search, starts, without=frozenset(names) - {*alone, *together})
+        closest = answer or first
+    bounds = tuple(key for key, factor in closest.at_bounds.items() if abs(factor) > _HELD)
+    return Conflict(alone, together, closest, bounds)
 
 
 def _value(search: Search, name: str, x: Any) -> float:
@@ -93,12 +92,12 @@ def _together(
     """A smallest set of the limits `names` that conflict, by deletion, and the nearest machine under it; the limits
     `out` are left out."""
     # limits that the nearest machine meets are the first to be taken out
-    rest, last = sorted(names, key=lambda name: first.misses.get(name, 0.0)), first
-    for name in list(rest):
-        if len(rest) == 1:
+    left_in, closest = sorted(names, key=lambda name: first.misses.get(name, 0.0)), first
+    for name in list(left_in):
+        if len(left_in) == 1:
             break
         answer, met = nearest(search, starts, out | {name})
         if not met and answer is not None:
-            out, last = out | {name}, answer
-            rest.remove(name)
-    return last, tuple(rest)
+            out, closest = out | {name}, answer
+            left_in.remove(name)
+    return closest, tuple(left_in)

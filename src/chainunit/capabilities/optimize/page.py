@@ -62,6 +62,7 @@ def optimum_report(
 
 
 def _title(best: Best, title: str) -> str:
+    """The title of the report, which says whether a machine was found."""
     if best.met:
         return title or "The best machine"
     return f"{title}: no machine found" if title else "No machine found"
@@ -81,6 +82,7 @@ class OptimizedStudy(NamedTuple):
         return optimum_report(self.best, config.title, config.file, config.units, live)
 
     def _live(self) -> b.LiveMachine:
+        """The live machine of the study with the best machine."""
         source, tables = self.as_file()
         with scratch() as folder:
             return live_of_config(of_tables(tables, str(source)), folder)
@@ -136,6 +138,7 @@ TASK: Task[Config, OptimizedStudy] = Task(
 
 
 def _opening(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """The best machine beside that of today, or the reason why there is none."""
     if x.conflict is not None:
         first, *others = x.conflict.sentences
         yield b.Judgement("bad", first)
@@ -158,6 +161,7 @@ def _opening(best: Best, x: BestMachine) -> Iterator[b.Block]:
 
 
 def _share(x: TodayAndBest) -> Line:
+    """The change from today in per cent, to follow a number; nothing without both numbers."""
     today, value = number(x.today).value, number(x.best).value
     if not today or value is None:
         return ()
@@ -166,6 +170,7 @@ def _share(x: TodayAndBest) -> Line:
 
 
 def _turns(best: Best) -> fig.Figure:
+    """The torque over the turn of the best machine and of that of today."""
     angle = fig.Axis("crank angle", "rad", step=45.0)
     curves = tuple(
         fig.Curve(name, best.turns["angle"], best.turns[key], look)
@@ -182,6 +187,7 @@ def _turns(best: Best) -> fig.Figure:
 
 
 def _machine(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """The free parameters, the objectives and the limits, of today and of the best or nearest machine."""
     head = "best" if best.met else "nearest"
     yield from table(
         x.parameters.items(),
@@ -217,6 +223,7 @@ def _machine(best: Best, x: BestMachine) -> Iterator[b.Block]:
 
 
 def _binding(x: BestMachine) -> Iterator[b.Block]:
+    """Sentences on the limits and bounds that hold the best machine back."""
     if not x.bindings:
         yield b.Text("No limit and no bound holds the best machine back.")
     for binding in x.bindings:
@@ -228,6 +235,7 @@ def _binding(x: BestMachine) -> Iterator[b.Block]:
 
 
 def _front(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """The machines of the front in a table and in a figure."""
     first, second = best.wishes.objectives
     names = best.wishes.names
     yield b.Text(
@@ -258,6 +266,7 @@ def _front(best: Best, x: BestMachine) -> Iterator[b.Block]:
 
 
 def _checks(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """How many starts agree, the effort, and whether a machine near the best one is better."""
     yield b.Text(x.starts.text)
     effort, counts = x.starts.effort, "{} programs, {} iterations, {} turns computed."
     sizes = map(exact, (effort.programs, effort.iterations, effort.evaluations))

@@ -98,6 +98,7 @@ class TurnProgram:
     ) -> None:
         import casadi
 
+        # symbols: variables, upper limits of the rows, peaks of the rows over the turn, nodes of the means
         n = columns.size
         z = casadi.MX.sym("z", n + auxiliary)
         over_turn = [k for k, row in enumerate(rows) if row.kind in OVER_TURN]
@@ -128,15 +129,13 @@ class TurnProgram:
         mean, distances = table(["mean", "rms"], at_nodes), columns.distance(x)
 
         def terms(k: int, row: Row) -> Any:
-            """The terms of a row at its angles."""
+            """The sum of the terms of a row, at each of its angles."""
             if row.kind in ("reached", "slope", "auxiliary"):
-                order = int(row.kind == "slope")
-                reached = [
-                    factor
-                    * columns.function([column], order)(x, derived, casadi.vertcat(z[n + angle], speed))[-1]
-                    for angle, column, factor in row.terms
-                ]
-                return sum(reached, casadi.MX(0.0))
+                order, total = int(row.kind == "slope"), casadi.MX(0.0)
+                for angle, column, factor in row.terms:
+                    lane = casadi.vertcat(z[n + angle], speed)
+                    total += factor * columns.function([column], order)(x, derived, lane)[-1]
+                return total
             ((_, column, factor),) = row.terms
             if row.kind == "distance":
                 return factor * distances[column]
@@ -153,8 +152,9 @@ class TurnProgram:
 
         constraints = []
         for k, row in enumerate(rows):
-            rest = sum((factor * z[n + place] for place, factor in row.aux), -upper[k])
-            constraints.append((casadi.vertcat(terms(k, row)) + rest) / row.scale)
+            shift = sum((factor * z[n + place] for place, factor in row.aux), -upper[k])
+            constraints.append((casadi.vertcat(terms(k, row)) + shift) / row.scale)
+        # of each constraint: its row, whether it is an equality, and whether a cost lifts it
         self._row = np.repeat(np.arange(len(rows)), [part.numel() for part in constraints])
         self._equal = np.array([row.equal for row in rows])[self._row]
         self._lifts = {
@@ -182,26 +182,26 @@ class TurnProgram:
         z, p = z.copy(), np.concatenate([upper, np.ravel(lanes.peaks), np.ravel(lanes.nodes)])
         start: dict[str, Any] = {}
         if last is not None:
-            # each peak begins with the multipliers of the nearest angles
-            parts = list(last.multipliers)
+            # each peak begins with the multipliers of the angles and speeds that were nearest to it
+            first_multipliers: list[Any] = list(last.multipliers)
             for k, before, now in zip(self._over_turn, last.lanes, lanes.peaks, strict=True):
-                parts[k] = np.zeros(len(now))
-                way = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0]))) + np.abs(
-                    before[1][:, None] - now[:, 1]
-                )
-                np.add.at(parts[k], np.argmin(way, axis=1), last.multipliers[k])
-            start = {"lam_g0": np.concatenate(parts), "lam_x0": last.bounds}
+                first_multipliers[k] = np.zeros(len(now))
+                angle_gap = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0])))
+                gap = angle_gap + np.abs(before[1][:, None] - now[:, 1])
+                np.add.at(first_multipliers[k], np.argmin(gap, axis=1), last.multipliers[k])
+            start = {"lam_g0": np.concatenate(first_multipliers), "lam_x0": last.bounds}
         else:
+            # a cost that lifts a constraint begins so large that none is exceeded
             exceeded = np.array(self._constraints(z, p)).ravel()
-            for place, those in self._lifts.items():
-                most = np.max(exceeded[those & np.isfinite(exceeded)], initial=0.0)
-                z[place] = most + 1e-3 * (1.0 + most)
-        least = np.concatenate([np.zeros(self._free), low])
-        most = np.where(np.arange(len(z)) < self._free, 1.0, np.inf)
+            for place, is_lifted in self._lifts.items():
+                excess = np.max(exceeded[is_lifted & np.isfinite(exceeded)], initial=0.0)
+                z[place] = excess + 1e-3 * (1.0 + excess)
+        lowest = np.concatenate([np.zeros(self._free), low])
+        highest = np.where(np.arange(len(z)) < self._free, 1.0, np.inf)
         # Python drops an interrupt that it raises inside the solver
         with stoppable() as self._watch.stopped:
             out = self._solver(
-                x0=z, p=p, lbx=least, ubx=most, lbg=np.where(self._equal, 0.0, -np.inf), ubg=0.0, **start
+                x0=z, p=p, lbx=lowest, ubx=highest, lbg=np.where(self._equal, 0.0, -np.inf), ubg=0.0, **start
             )
             if self._watch.stopped():
                 raise KeyboardInterrupt

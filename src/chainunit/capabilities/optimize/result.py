@@ -177,17 +177,14 @@ def best_machine(best: Best, heading: Heading) -> BestMachine:
 def units_of(best: Best, tables: Mapping[str, Any], units: Units) -> Units:
     """The units of the report: the `units` of the study, and W for powers where one is below 100 W and the `tables`
     of the study do not name a unit."""
-    powers = [
-        abs(x)
-        for name, q in best.quantities.items()
-        for limit in (_limit_of(best, name),)
-        for x in (best.today[name], best.found[name], limit and limit.low, limit and limit.high)
-        if q.unit == "W" and x
-    ]
-    named = tables.get("report", {}).get("units", {})
-    if "power" in named or not any(x < _SMALL for x in powers):
-        return units
-    return {**units, "power": ("W",)}
+    powers: list[float | None] = []
+    for name, q in best.quantities.items():
+        if q.unit == "W":
+            powers += [best.today[name], best.found[name]]
+            powers += [limit.low, limit.high] if (limit := _limit_of(best, name)) is not None else []
+    is_small = any(abs(power) < _SMALL for power in powers if power)
+    named_units = tables.get("report", {}).get("units", {})
+    return {**units, "power": ("W",)} if is_small and "power" not in named_units else units
 
 
 def _limit_of(best: Best, name: str) -> TurnLimit | None:
@@ -214,6 +211,7 @@ def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:
 
 
 def _quantity(best: Best, name: str) -> SoughtQuantity:
+    """An objective or a limited quantity, of the machine of today and of the best one."""
     q, limit = best.quantities[name], _limit_of(best, name)
     return SoughtQuantity(
         title=q.description,
@@ -237,6 +235,7 @@ def _organs(best: Best) -> list[SpeedLimit]:
 
 
 def _conflict(best: Best) -> WhyNone | None:
+    """The limits that conflict, ready for the result; None where a machine meets all limits."""
     conflict = best.conflict
     if conflict is None:
         return None

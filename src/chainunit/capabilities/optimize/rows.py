@@ -71,12 +71,15 @@ class LimitRows:
     def at_most(
         self, q: CycleQuantity, owner: str, scale: float, bound: float = 0.0, objective: int | None = None
     ) -> None:
-        """Rows by which a quantity is at most `bound`, or at most `scale` times the variable `objective`."""
+        """Rows by which a quantity is at most `bound`, or at most `scale` times the auxiliary variable `objective`.
+        The rows follow from its reduction: a largest value is a row over the turn, a least one an angle that reaches
+        it."""
 
         def add(kind: Kind, column: int, factor: float, times: float = 1.0) -> None:
+            """A row by which `factor` times a column is at most `times` the bound of the quantity."""
             aux = () if objective is None else ((objective, -times * scale),)
             term = ((-1, column, factor),)
-            self.rows.append(Row(kind, owner, "max", times * bound, times * scale, term, aux, False, times))
+            self.rows.append(Row(kind, owner, "max", times * bound, times * scale, term, aux, times=times))
 
         column, reduction = q.integrands[0].column, q.reduction
         if reduction in ("max", "peak"):
@@ -133,19 +136,21 @@ class LimitRows:
             self.rows.append(Row("distance", owner, name, -clearance * size, size, term, (), False, size))
 
     def loosen(self) -> dict[str, int]:
-        """Give each limit a slack, by which all its rows may be exceeded; returns the numbers of the slacks."""
+        """Give each limit a slack: an auxiliary variable, at least 0, by which all its rows may be exceeded, in parts
+        of their scales. An equality becomes two rows, one for each direction. Returns the slacks by limit."""
         slacks: dict[str, int] = {}
         tight, self.rows = self.rows, []
         for row in tight:
-            if row.owner:
-                if row.owner not in slacks:
-                    slacks[row.owner] = self.auxiliary(0.0, 0.0)
-                slack = slacks[row.owner], -row.scale
-                if row.equal:
-                    terms = tuple((angle, k, -factor) for angle, k, factor in row.terms)
-                    self.rows.append(replace(row, upper=-row.upper, terms=terms, aux=(slack,), equal=False))
-                row = replace(row, aux=(*row.aux, slack), equal=False)
-            self.rows.append(row)
+            if not row.owner:
+                self.rows.append(row)
+                continue
+            if row.owner not in slacks:
+                slacks[row.owner] = self.auxiliary(0.0, 0.0)
+            slack = slacks[row.owner], -row.scale
+            if row.equal:
+                opposite = tuple((angle, k, -factor) for angle, k, factor in row.terms)
+                self.rows.append(replace(row, upper=-row.upper, terms=opposite, aux=(slack,), equal=False))
+            self.rows.append(replace(row, aux=(*row.aux, slack), equal=False))
         return slacks
 
     def _mean(self, q: CycleQuantity) -> tuple[Kind, int, float] | None:
@@ -174,7 +179,9 @@ class LimitRows:
         factor: float,
         equal: bool = False,
     ) -> None:
-        """Rows by which `factor` times a quantity is at most `upper`, at angles of its own."""
+        """Rows by which `factor` times a quantity is at most `upper`, or exactly `upper` if it is `equal`, at angles
+        that are auxiliary variables: they begin where the extremes of its columns are, and with an equality the
+        slopes there are zero."""
         terms: list[tuple[int, str, float]] = []
         for reduction in ("max", "min", "peak"):
             names = [i.column for i in q.integrands if i.reduction == reduction]

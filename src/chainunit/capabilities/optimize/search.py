@@ -104,13 +104,13 @@ class Search:
             if there is none.
         """
         low, span = self.columns.low, self.columns.span
-        inside = np.clip(self.today, low, low + span)
-        for x in (inside, *(low + span * _sobol(len(low), 4096, self.wishes.seed))):
+        clipped = np.clip(self.today, low, low + span)
+        for x in (clipped, *(low + span * _sobol(len(low), 4096, self.wishes.seed))):
             if self.turns(x):
                 return x
         obstacle = " cannot be assembled at each angle."
         try:
-            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, inside), strict=True)))
+            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, clipped), strict=True)))
         except InputError as error:
             obstacle = f": {error}"
         raise RunError(
@@ -160,6 +160,7 @@ class Search:
         from scipy.optimize import minimize_scalar
 
         def pulls(q: Any, shares: Any) -> Any:
+            """The least pull of all webs at these angles and shares of the slack-free speed."""
             w = np.repeat(np.atleast_1d(shares) * self.wishes.slack_free_speed, len(q))
             values = self.columns.values(x, np.tile(q, np.size(shares)), w, self.pulls)
             return np.min(values, axis=(0, 1)).reshape(np.size(shares), len(q))
@@ -238,10 +239,11 @@ class Search:
         tight = [row for row in rows.rows if row.kind in _POWERS and row.owner and self._is_tight(row, x)]
         nodes, _ = self._nodes(tight, x, nodes)
         lanes, worst = Lanes(np.zeros((number, 0, 3)), nodes), math.inf
+        # a rough program with all angles of a grid, and then programs with the peaks of the solution before
         point = self._run(rows, costs, z, lanes, None)
         # a start that ends where another one did has its answer
-        begun = self._answers.setdefault((tuple(rows.rows), costs), [])
-        for z, answer in begun:
+        earlier = self._answers.setdefault((tuple(rows.rows), costs), [])
+        for z, answer in earlier:
             if np.max(np.abs(point.z - z)) < _SAME:
                 return answer
         rough = point.z
@@ -261,8 +263,8 @@ class Search:
             if not more:
                 break
             point = self._run(rows, costs, z, lanes, point)
-        begun.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
-        return begun[-1][1]
+        earlier.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
+        return earlier[-1][1]
 
     def _run(
         self, rows: LimitRows, costs: tuple[int, ...], z: Any, lanes: Lanes, last: Solution | None
@@ -284,16 +286,18 @@ class Search:
         return self.columns.low + self.columns.span * point.z[: self.columns.size]
 
     def _followed(self, rows: Sequence[Row], point: Solution, lanes: Lanes) -> tuple[Lanes, bool, float]:
-        """The lanes of a further program; whether there must be one: a limit is exceeded between the angles, a peak
-        has moved too far, or a mean is rough; and the most by which a limit is exceeded, over its scale."""
+        """The lanes of a further program, with the peaks of its rows at this solution; whether there must be one: a
+        limit is exceeded between the angles, a peak has moved too far, or a mean is rough; and the most by which a
+        limit is exceeded, over its scale."""
         x, over_turn = self._x(point), [k for k, row in enumerate(rows) if row.kind in OVER_TURN]
         tops, more = [], not lanes.sizes[0]
-        for k, before in zip(over_turn, lanes.peaks, strict=True):
+        for k, peaks_before in zip(over_turn, lanes.peaks, strict=True):
             tops.append(self._tops(rows[k], x, point.z[self.columns.size :]))
-            if len(before):
-                angle, speed, inverse_bend = before.T
+            if len(peaks_before):
+                angle, speed, inverse_bend = peaks_before.T
                 ((_, column, _),) = rows[k].terms
                 _, (slopes,) = self.columns.values(x, angle, speed, [column], 1)
+                # slope over curvature is the way to the extreme
                 has_moved = np.abs(slopes * inverse_bend) > _WAY
                 more |= bool(np.any((point.exceeded[k] > -_MET) & has_moved))
         worst = max((float(np.max(top[:, 0])) for top in tops), default=-math.inf)
@@ -313,13 +317,15 @@ class Search:
         return [share * highest for share in CHECKED] if row.kind == "slack" else [self.wishes.crank_speed]
 
     def _tops(self, row: Row, x: Any, aux: Any) -> Any:
-        """The peaks of a row over the turn near its limit, and the largest one, near which the next solution may be:
-        as of `_peaks`, with the share of its scale by which each exceeds the limit in place of the value."""
+        """The peaks of a row over the turn that come near to its limit or exceed it, and always the largest one: as
+        of `_peaks`, but with the excess over the limit, in parts of the row's scale, in place of the value. `aux` are
+        the auxiliary variables of the program, which shift the row."""
         ((_, column, factor),) = row.terms
         offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
-        top = self._peaks(x, column, factor, self._speeds(row), -offset - _LOOKED_AT * row.scale)
-        top[:, 0] = (top[:, 0] + offset) / row.scale
-        return top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))]
+        peaks = self._peaks(x, column, factor, self._speeds(row), -offset - _LOOKED_AT * row.scale)
+        excess = (peaks[:, 0] + offset) / row.scale
+        peaks[:, 0] = excess
+        return peaks[excess >= min(-_NEAR, np.max(excess))]
 
     def _is_tight(self, row: Row, x: Any) -> bool:
         """Whether a mean is near its limit at a machine."""
@@ -357,21 +363,22 @@ class Search:
         is_peak[np.argmax(y)] = True
         places = np.flatnonzero(is_peak)
         places = places[np.argsort(-y.ravel()[places])][:_MOST_PEAKS]
-        (begin, w), top = lanes[:, places], y.ravel()[places]
-        q, step = begin, 2.0 * math.pi / FINE
+        (grid_q, w), grid_value = lanes[:, places], y.ravel()[places]
+        q, step = grid_q, 2.0 * math.pi / FINE
+        # of nine angles around each peak the best is next, within a quarter of the distance
         for k in range(_ROUNDS):
             near = q[:, None] + step * 0.25**k * np.linspace(-1.0, 1.0, 9)
             values = self.columns.values(x, near.ravel(), np.repeat(w, 9), [column]).reshape(near.shape)
             q = near[np.arange(len(q)), np.argmax(factor * values, axis=1)]
+        # value, slope and bend at the peaks, and the values a step of the grid beside them
         around = np.concatenate([q, q - step, q + step])
-        (value, *beside), (slope, *_), (bend, *_) = self.columns.values(
-            x, around, np.tile(w, 3), [column], 2
-        ).reshape(3, 3, -1)
+        derivatives = self.columns.values(x, around, np.tile(w, 3), [column], 2).reshape(3, 3, -1)
+        (value, *beside), (slope, *_), (bend, *_) = derivatives
         least_drop = np.min(factor * (value - beside), axis=0)
         # a kink, or a peak that is narrower than the grid, counts as the angle of the grid
         smooth = (factor * bend < 0.0) & (np.abs(slope) < _EXACT * np.abs(bend))
         smooth &= 0.5 * np.abs(bend) * step**2 < _NARROW * least_drop
-        value, q = np.where(smooth, factor * value, top), np.where(smooth, q, begin)
+        value, q = np.where(smooth, factor * value, grid_value), np.where(smooth, q, grid_q)
         return np.stack([value, q, w, smooth / np.where(smooth, bend, 1.0)], axis=1)
 
     def _answer(

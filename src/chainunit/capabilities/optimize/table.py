@@ -141,9 +141,11 @@ def wishes_of(plans: Mapping[str, Any]) -> Wishes:
 def _free(
     tables: Mapping[str, Any], model: MachineModel, of_catalogue: bool, faults: Faults
 ) -> dict[str, tuple[float, float]]:
+    """The bounds of the free parameters by name, of the `tables` [optimize.free.name]."""
     variables = {v.name: v for v in model.parameter_layout.variables}
 
     def read(entry: Entry, name: str) -> tuple[str, tuple[float, float]]:
+        """Name and bounds of a free parameter."""
         if name not in variables:
             entry.fault("", f"no such parameter of the machine{_hint(name, variables)}")
             entry.refuse()
@@ -179,14 +181,14 @@ def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, 
         entry.wrong("", entry.raw, f"must be a table with {needed}")
         entry.refuse()
     entry.keys("", entry.given, _ENDS)
-    low, high = (
-        entry.quantity(end, variable, entry.given[end]) if end in entry.given else missing
-        for end, missing in zip(_ENDS, (-math.inf, math.inf), strict=True)
-    )
+    low_end, high_end = _ENDS
+    low = entry.quantity(low_end, variable, entry.given[low_end]) if low_end in entry.given else -math.inf
+    high = entry.quantity(high_end, variable, entry.given[high_end]) if high_end in entry.given else math.inf
     return low, high, unit_behind(variable.unit)
 
 
 def _limit(entry: Entry, name: str, model: MachineModel) -> TurnLimit:
+    """The limit that a table states for the quantity of that name."""
     with refusal_prefix("optimize.limits: ", entry.place):
         q = cycle_quantity(name, model)
     variable = Variable(name, q.description, Quantity(q.unit, q.description))

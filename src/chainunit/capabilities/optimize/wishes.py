@@ -31,11 +31,9 @@ class TurnLimit:
 
     def is_missed(self, value: float) -> bool:
         """Whether a value is outside the limits by more than a millionth of them."""
-        low, high = (
-            sign * value < sign * bound - 1e-6 * abs(bound) if bound is not None else False
-            for sign, bound in ((1.0, self.low), (-1.0, self.high))
-        )
-        return low or high or math.isnan(value)
+        is_below = self.low is not None and value < self.low - 1e-6 * abs(self.low)
+        is_above = self.high is not None and value > self.high + 1e-6 * abs(self.high)
+        return is_below or is_above or math.isnan(value)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ _UNITS = {
     "kg.m2": (0.1, "0.1 kg m2"),
 }
 """By unit, a step of a limit that a reader knows, in the unit and in words."""
+_TELLING = 1e-4
+"""Least change of the objective, as a share of it, by which a clearance counts as one that binds."""
 _ACTIVE = 1e-6
 """Least change of the objective, as a share of it, by a step of a limit that binds."""
 
@@ -80,14 +82,14 @@ def _binding(best: Best, name: str, side: str, value: Any, unit: str, slope: flo
 
 
 def clearances(best: Best) -> list[str]:
-    """The requirements of the model whose distance binds."""
+    """The requirements of the model that bind: whose clearance, if it were given up, would change the objective by
+    more than `_TELLING` of it."""
     assert best.answer is not None
-    size = abs(best.answer.value) or 1.0
-    return [
-        subject
-        for (owner, subject), slope in best.answer.sensitivities.items()
-        if owner == TURNS and abs(slope) * best.wishes.clearance > 1e-4 * size
-    ]
+    least = _TELLING * (abs(best.answer.value) or 1.0)
+    slopes = {
+        subject: slope for (owner, subject), slope in best.answer.sensitivities.items() if owner == TURNS
+    }
+    return [subject for subject, slope in slopes.items() if abs(slope) * best.wishes.clearance > least]
 
 
 def idle_sentence(best: Best) -> str:
@@ -101,9 +103,8 @@ def idle_sentence(best: Best) -> str:
 def limit_words(limit: TurnLimit) -> str:
     """A limit in words: ``range(rocker.psi) from 16 deg to 20 deg``."""
     q = limit.quantity
-    low, high = (
-        None if x is None else number(x, q.unit, q.kind, full=False) for x in (limit.low, limit.high)
-    )
+    low = None if limit.low is None else number(limit.low, q.unit, q.kind, full=False)
+    high = None if limit.high is None else number(limit.high, q.unit, q.kind, full=False)
     if low is not None and high is not None:
         return f"{q.name} = {low}" if limit.low == limit.high else f"{q.name} from {low} to {high}"
     return f"{q.name} of at least {low}" if low is not None else f"{q.name} of at most {high}"
@@ -114,9 +115,8 @@ def conflict_sentences(best: Best) -> Iterator[str]:
     assert best.conflict is not None
     wishes, conflict = best.wishes, best.conflict
     quantities = {limit.name: limit.quantity for limit in wishes.limits}
-    alone, together = (
-        [_wish_words(best, name) for name in names] for names in (conflict.alone, conflict.together)
-    )
+    alone = [_wish_words(best, name) for name in conflict.alone]
+    together = [_wish_words(best, name) for name in conflict.together]
     if alone:
         remark = " Each of these limits is impossible alone." if len(alone) > 1 else ""
         yield f"No machine within the bounds has {'; none has '.join(alone)}.{remark}"
@@ -134,13 +134,13 @@ def conflict_sentences(best: Best) -> Iterator[str]:
         for name, value in values.items()
         if name in quantities and not math.isnan(value)
     )
-    which = "machine that comes nearest has"
+    machines = "machine that comes nearest has"
     if several and len(conflict.alone) == 1:
-        which = "machine that comes nearest to the first of these limits alone has"
+        machines = "machine that comes nearest to the first of these limits alone has"
     elif several:
-        which = "machines that come nearest to each of these limits alone have"
+        machines = "machines that come nearest to each of these limits alone have"
     if reached:
-        yield f"The {which} {reached}."
+        yield f"The {machines} {reached}."
     if conflict.bounds:
         units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
         bounds = (
@@ -151,6 +151,7 @@ def conflict_sentences(best: Best) -> Iterator[str]:
 
 
 def _wish_words(best: Best, name: str) -> str:
+    """A limit, the slack-free speed, or the need to turn, in words."""
     if name == SLACK:
         return f"webs that keep their pull up to {number(best.wishes.slack_free_speed, 'rad/s', 'speed')}"
     if name == TURNS:

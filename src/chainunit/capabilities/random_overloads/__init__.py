@@ -48,10 +48,10 @@ class RandomOverloads(Capability):
 
     def rules(self) -> Iterable[Rule]:
         """They need a model of the machine, and an event of its own where it has no sides."""
-        some = is_above_zero("monte_carlo.runs")
-        yield Rule("monte_carlo.runs", MACHINE_FMU, NEEDS_MODEL, some)
+        has_runs = is_above_zero("monte_carlo.runs")
+        yield Rule("monte_carlo.runs", MACHINE_FMU, NEEDS_MODEL, has_runs)
         reason = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
-        yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given(_EVENT)), reason, some)
+        yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given(_EVENT)), reason, has_runs)
 
     def plan(self, reading: FileReading) -> RandomPlan:
         """The plan, also of a file without the table."""

@@ -50,15 +50,10 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
     quantiles = {name: sizes for name, sizes in x.quantiles.items() if sizes}
     descriptions = {v.name: v.template for v in Layout(Sample).variables} | ENDS
     columns = list(dict.fromkeys(name for sizes in quantiles.values() for name in sizes))
-    rows = tuple(
-        b.TableRow(
-            (
-                of_driver(descriptions[name], study.setup.driver_noun),
-                *(estimate(sizes[column]) if column in sizes else "" for column in columns),
-            )
-        )
-        for name, sizes in quantiles.items()
-    )
+    rows = []
+    for name, sizes in quantiles.items():
+        cells = (estimate(sizes[column]) if column in sizes else "" for column in columns)
+        rows.append(b.TableRow((of_driver(descriptions[name], study.setup.driver_noun), *cells)))
     heads = (
         f"{column[1:]} % of runs below" if column.startswith("q") else "share of runs" for column in columns
     )
@@ -66,5 +61,5 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
     title = "Random overloads, {} runs{}; in brackets: the interval of {} confidence"
     counts = exact(x.runs), line(" (", sides, ")") if sides else (), exact(x.confidence)
     if rows:
-        yield b.Table(rows, b.heads("", *heads), title=filled(title, *counts))
+        yield b.Table(tuple(rows), b.heads("", *heads), title=filled(title, *counts))
     yield b.Text(f"The random overloads were run {_METHODS[findings.method]}.", "fine")

@@ -82,15 +82,15 @@ def sides_over_speed(machine: ChainUnitMachine, feed: Feed, highest: float = 15.
     adds up."""
     speed = np.linspace(highest / points, highest, points)
     peaks: dict[str, list[float]] = {
-        f"{torque}_{which}": [] for torque in _TORQUES for which in ("both", *SIDES)
+        f"{torque}_{feed_case}": [] for torque in _TORQUES for feed_case in ("both", *SIDES)
     }
     for w in speed:
         turns = {"both": cycle(machine, float(w), feed, 360)} | {
             side: cycle_alone(machine, side, float(w), feed, 360) for side in SIDES
         }
-        for which, turn in turns.items():
-            peaks[f"rocker_{which}"].append(peak(turn.outputs.rocker.tau))
-            peaks[f"crank_{which}"].append(peak(turn.crank_torque))
+        for feed_case, turn in turns.items():
+            peaks[f"rocker_{feed_case}"].append(peak(turn.outputs.rocker.tau))
+            peaks[f"crank_{feed_case}"].append(peak(turn.crank_torque))
     return Sides(speed, {name: np.array(sizes) for name, sizes in peaks.items()})
 
 

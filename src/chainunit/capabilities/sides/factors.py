@@ -58,18 +58,18 @@ def overload_factors(
     # each organ pulls hardest at the rocker where the rocker is farthest from it
     psi = extremes[0 if side == "left" else 1][0]
     static = machine.chamber(psi, 0.0, 0.0, feed.left, feed.right)
-    both = cycle(machine, crank_speed, feed)
+    normal = cycle(machine, crank_speed, feed)
     one_sided = cycle(machine, crank_speed, all_on_one(side, feed))
-    one = cycle_alone(machine, side, crank_speed, feed)
+    alone = cycle_alone(machine, side, crank_speed, feed)
 
     def ratio(x: Any, y: Any) -> float:
         whole = peak(y)
         return peak(x) / whole if whole > 0.0 else math.nan
 
     return OverloadFactors(
-        feed_crank_torque=ratio(one_sided.crank_torque, both.crank_torque),
-        feed_rocker_torque=ratio(one_sided.outputs.rocker.tau, both.outputs.rocker.tau),
-        crank_torque=ratio(one.crank_torque, both.crank_torque),
-        rocker_torque=ratio(one.outputs.rocker.tau, both.outputs.rocker.tau),
+        feed_crank_torque=ratio(one_sided.crank_torque, normal.crank_torque),
+        feed_rocker_torque=ratio(one_sided.outputs.rocker.tau, normal.outputs.rocker.tau),
+        crank_torque=ratio(alone.crank_torque, normal.crank_torque),
+        rocker_torque=ratio(alone.outputs.rocker.tau, normal.outputs.rocker.tau),
         static_at_extreme=ratio(getattr(static, side).tangential_load, static.rocker.tangential_load),
     )

@@ -25,27 +25,27 @@ _CAPTION = (
 
 
 def organ_motion(drive: Drive) -> Supplement:
-    """The supplement with the organs of both sides, each side in its colour."""
-    walls, _ = rods = _rods(drive)
-    joints = {side: _joints(names, rods) for side, names in NAMES.items()}
-    links = {
-        link: tuple(joints[side][span])
-        for side, names in NAMES.items()
-        for link, span in ((names.wall, slice(walls + 1)), (names.web, slice(walls, None)))
-    }
+    """The supplement with the organs of both sides, each side in its colour; wall and web are the rods between their
+    joints. Joints inside a wall or a web have no name in the picture."""
+    wall_rods, _ = rods = _rods(drive)
+    links, side_of_output = dict[str, tuple[str, ...]](), dict[str, str]()
+    inner_names, pin_names = dict[str, str](), dict[str, str]()
+    for side, names in NAMES.items():
+        joints = _joints(names, rods)
+        wall, web = tuple(joints[: wall_rods + 1]), tuple(joints[wall_rods:])
+        links |= {names.wall: wall, names.web: web}
+        inner_names |= dict.fromkeys((*wall[1:-1], *web[1:-1]), "")
+        pin_names |= {names.a1: "A1", names.b: "B"}
+        for output, (_, link) in ON_SIDE.items():
+            if link in (names.wall, names.web):
+                side_of_output[output] = side
     return OrganMotion(
         drive,
         _CAPTION,
         links,
         looks=dict.fromkeys(links, "chain"),
-        names={pin: "" for pins in links.values() for pin in pins[1:-1]}
-        | {pin: name for names in NAMES.values() for pin, name in ((names.a1, "A1"), (names.b, "B"))},
-        groups={
-            output: side
-            for side, names in NAMES.items()
-            for output, (_, link) in ON_SIDE.items()
-            if link in (names.wall, names.web)
-        },
+        names=inner_names | pin_names,
+        groups=side_of_output,
         # their arrows would hide the arrows of the rocker
         hidden=("crank_pin", "coupler_pin", *(output for _, output, _ in BEARINGS)),
     )
@@ -89,10 +89,9 @@ class OrganMotion(Supplement):
         """The places of the inner joints of a chain [m], and its processing force [N]."""
         drive, names = self.drive, NAMES[side]
         p, (walls, webs) = drive.machine.p, _rods(drive)
-        theta, omega = (
-            [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
-            for x in ("theta", "omega")
-        )
+        rods = range(1, walls + webs + 1)
+        theta = [part[f"machine.{side}.theta_{k}"].values for k in rods]
+        omega = [part[f"machine.{side}.omega_{k}"].values for k in rods]
         chain = pins([p.l1 / walls] * walls + [p.l2 / webs] * webs, theta, omega, numpy_())
         v, force = chain[walls].p1, part[f"machine.{side}.processing_force"].values
         law = Resistance(names.b, force, p.processing)

@@ -29,35 +29,32 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _factors(setup: StudySetup, x: OrganFindings) -> b.Table:
+    """A row for each overload factor, with a column for each side alone."""
     sides = x.overload_factors
     by = f", of {organs}" if (organs := setup.drive.machine.in_place) else ""
     title = line("Overload factor, one side against both, at ", asked_speed(setup), by)
     first = next(iter(sides.values()))
-    rows = (
-        b.TableRow(
-            (v.description, *(number(factors[v.name].value) for factors in sides.values()), first[v.name].use)
-        )
-        for v in Layout(OverloadFactors).variables
-    )
+    rows = []
+    for v in Layout(OverloadFactors).variables:
+        sizes = (number(factors[v.name].value) for factors in sides.values())
+        rows.append(b.TableRow((v.description, *sizes, first[v.name].use)))
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 
 def _limits(setup: StudySetup, x: OrganFindings) -> Iterator[b.Block]:
+    """Swing of the rocker, slack speeds and lowest mode in sentences, and the limits of the model in a table."""
     limits = x.limits
     swing = number(limits.rocker_extreme_left), number(limits.rocker_extreme_right), number(limits.margin)
     yield b.Text(filled("Rocker swings from {} to {}; margin {}.", *swing), form="short")
     web = "with two bars a web" if setup.drive.machine.in_place else "a web"
+    slack_speeds = {"with this feed": number(limits.slack_speed), "empty": number(limits.slack_speed_empty)}
     cases, speeds = [], []
-    for case, speed in (
-        ("with this feed", number(limits.slack_speed)),
-        ("empty", number(limits.slack_speed_empty)),
-    ):
-        if speed.value is not None:
-            cases.append(
-                f"{case}, {web} "
-                + ("first goes slack at {} of the crank" if speed.value else "is slack at rest")
-            )
-            speeds += [speed] if speed.value else []
+    for case, speed in slack_speeds.items():
+        if speed.value:
+            cases.append(f"{case}, {web} first goes slack at {{}} of the crank")
+            speeds.append(speed)
+        elif speed.value is not None:
+            cases.append(f"{case}, {web} is slack at rest")
     mode = number(limits.chain_resonance)
     if mode.value is not None:
         cases.append("the lowest mode of a chain lies near {}")
@@ -104,25 +101,23 @@ _SHADED = (
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
 def _sides(study: StudyRecord) -> fig.Figure:
-    sides = OrganFindings.of_study(study.findings).sides
-    titles = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
+    """The peaks of the crank torque and of the rocker torque over the speed, in two panels."""
+    findings = OrganFindings.of_study(study.findings)
+    sides, mode = findings.sides, finite(findings.limits.chain_resonance)
+    fastest = float(sides.speed[-1])
 
     def items(torque: str) -> Iterator[fig.Item]:
-        for look, (which, name) in enumerate(titles.items()):
-            yield fig.Curve(name, sides.speed, sides.peaks[f"{torque}_{which}"], look)
-        yield from (
-            fig.Mark(crossing.value, look="thin")
-            for speeds in sides.crossings[torque].values()
-            for crossing in speeds
-        )
+        """The curves of a panel; marks where they cross and at normal running, a shade where two bars err."""
+        yield fig.Curve("both sides", sides.speed, sides.peaks[f"{torque}_both"], 0)
+        for look, side in enumerate(SIDES, 1):
+            yield fig.Curve(f"{side} side alone", sides.speed, sides.peaks[f"{torque}_{side}"], look)
+        for speeds in sides.crossings[torque].values():
+            yield from (fig.Mark(crossing.value, look="thin") for crossing in speeds)
         yield fig.Mark(study.setup.config.run.crank_speed, "normal running")
-        if mode is not None and _GOOD[torque] * mode < sides.speed[-1]:
-            yield fig.Shade(
-                _GOOD[torque] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %"
-            )
+        if mode is not None and _GOOD[torque] * mode < fastest:
+            yield fig.Shade(_GOOD[torque] * mode, fastest, "two bars may be off by more than 10 %")
 
-    mode = finite(OrganFindings.of_study(study.findings).limits.chain_resonance)
-    x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
+    x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=fastest)
     axes = {torque: fig.Axis(f"{torque} torque, peak", "N.m", low=0.0) for torque in ("crank", "rocker")}
     caption = (
         "Largest torques of a turn by inverse dynamics of two bars. Where lines cross, one side alone asks as much "
@@ -133,7 +128,7 @@ def _sides(study: StudyRecord) -> fig.Figure:
         "One side alone against both, over the speed",
         "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with each side "
         "alone; the speed of normal running is marked.",
-        fig.stacked(x, ((axis, items(of)) for of, axis in axes.items())),
+        fig.stacked(x, ((axis, items(torque)) for torque, axis in axes.items())),
         line(caption, *_crossings(cited(sides, "findings.organs.sides_over_speed")), f". {_SHADED}"),
     )
 

@@ -7,7 +7,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -128,8 +128,14 @@ def _loaded_starts(runs: StudyRuns) -> list[Event]:
     return [event for event in runs.events.values() if event.from_rest and event.name in runs.answers]
 
 
-_Trial = tuple[Rig, float, dict[str, float], DriveTables]
-"""A rig with a starter, the time after which its start-up counts as failed [s], its numbers, and its tables."""
+class StarterTrial(NamedTuple):
+    """A starter to be tried: the drive with it in a `rig`, the time after which its start-up counts as `failed_after`
+    [s], its `numbers` by name, and its `tables`."""
+
+    rig: Rig
+    failed_after: float
+    numbers: dict[str, float]
+    tables: DriveTables
 
 
 @dataclasses.dataclass(frozen=True)
@@ -153,41 +159,48 @@ class ChosenMotor:
 
 
 def _gentlest(
-    trials: Iterator[_Trial], study: StudyRecord, chosen: ChosenMotor, goal: float, limit: float
-) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
+    trials: Iterator[StarterTrial], study: StudyRecord, chosen: ChosenMotor, goal: float, limit: float
+) -> tuple[StarterTrial, list[StartNumbers]] | None:
     """The first of the `trials` whose starts take at most the time `limit` [s], are permitted, and put at most `goal`
-    [N m] on the coupling, or else the one with the gentlest starts. None if none is permitted."""
-    events = _loaded_starts(study.runs)
-    angle, full = _worst(study.findings).angle, []
-    probes: list[tuple[float, _Trial]] = []
+    [N m] on the coupling, or else the one with the gentlest starts; with its starts from all angles. None if none is
+    permitted. One start, from the hardest angle known so far, tells whether a trial is worth all of them."""
+    events, angle = _loaded_starts(study.runs), _worst(study.findings).angle
+    permitted: list[tuple[StarterTrial, list[StartNumbers]]] = []
+    too_hard: list[tuple[float, StarterTrial]] = []
+
+    def is_permitted(trial: StarterTrial) -> bool:
+        """Whether all starts of a trial are permitted; then it is one of the `permitted`."""
+        starts = starts_from_all(trial.rig, trial.failed_after, events)
+        if not chosen.permits(study.setup, trial.rig, trial.tables, starts):
+            return False
+        permitted.append((trial, starts))
+        return True
+
     for trial in trials:
-        probe = start_from(trial[0], angle, trial[1])
+        probe = start_from(trial.rig, angle, trial.failed_after)
         if probe.start_time is None or probe.start_time > limit:
             continue
         if probe.coupling_torque > goal:
-            probes.append((probe.coupling_torque, trial))
-            continue
-        starts = starts_from_all(trial[0], trial[1], events)
-        if chosen.permits(study.setup, trial[0], trial[3], starts):
-            full.append((trial[0], starts, trial[2]))
+            too_hard.append((probe.coupling_torque, trial))
+        elif is_permitted(trial):
+            _, starts = permitted[-1]
             if hardest(starts) <= goal:
-                return full[-1]
-            # the next one is probed at the angle at which this one is hardest
+                return permitted[-1]
             angle = max(starts, key=lambda start: start.coupling_torque).angle
-    for _, trial in sorted(probes, key=lambda probe: probe[0]):
-        starts = starts_from_all(trial[0], trial[1], events)
-        if chosen.permits(study.setup, trial[0], trial[3], starts):
-            full.append((trial[0], starts, trial[2]))
+    # the gentlest of the trials that are too hard, beside the permitted ones
+    for _, trial in sorted(too_hard, key=lambda pair: pair[0]):
+        if is_permitted(trial):
             break
-    return min(full, key=lambda trial: hardest(trial[1]), default=None)
+    return min(permitted, key=lambda pair: hardest(pair[1]), default=None)
 
 
 def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **more: float) -> WayNumbers:
-    """The numbers of a starter; no setting where the gear does not carry it."""
+    """The numbers of a starter: the least setting of the coupling that neither `running` [N m] nor one of the
+    `starts` opens, or None where the gear does not carry it, and with `more` the values of the starter."""
     start = hardest(starts)
-    least = MARGIN * max(running, start)
+    least_setting = MARGIN * max(running, start)
     return WayNumbers.of(
-        setting=least if least < setting.gear else None,
+        setting=least_setting if least_setting < setting.gear else None,
         running=running,
         start=start,
         start_time=max(entry.start_time for entry in starts),
@@ -202,7 +215,8 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting, chosen: Chosen
     plate = study.setup.plate.nameplate
     usual = longest_start(rig.operation.ramp_end, study.runs.start.start_time)
 
-    def rigs() -> Iterator[_Trial]:
+    def trials() -> Iterator[StarterTrial]:
+        """The drive with each pair of voltage and ramp of a soft starter."""
         for voltage, time in SOFT_STARTERS:
             starter = dataclasses.replace(tables.starter, soft_start=SoftStart(voltage=voltage, time=time))
             soft_tables = dataclasses.replace(tables, start="soft", starter=starter)
@@ -212,13 +226,13 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting, chosen: Chosen
                 operation=dataclasses.replace(rig.operation, starter_time=time),
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
-            yield soft, usual + time, {"voltage": voltage, "ramp": time}, soft_tables
+            yield StarterTrial(soft, usual + time, {"voltage": voltage, "ramp": time}, soft_tables)
 
-    best = _gentlest(rigs(), study, chosen, setting.running, starting(None, plate).limit)
+    best = _gentlest(trials(), study, chosen, setting.running, starting(None, plate).limit)
     if best is None:
         return Alternative(Way.SOFT_STARTER, WayNumbers.of(), {})
-    _, starts, numbers = best
-    result = _as_numbers(setting, setting.running, starts, **numbers)
+    trial, starts = best
+    result = _as_numbers(setting, setting.running, starts, **trial.numbers)
     return _tried(study, Way.SOFT_STARTER, result, setting.overloads)
 
 
@@ -253,7 +267,8 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
     inverter_tables = dataclasses.replace(tables, start="inverter")
     fed = with_starter(inverter_tables, rig.drive.parameters, plate)
 
-    def rigs(boost: float) -> Iterator[_Trial]:
+    def trials(boost: float) -> Iterator[StarterTrial]:
+        """The drive with an inverter of that boost, with each of the ramps, the shortest first."""
         for ramp in RAMPS:
             run = dataclasses.replace(rig.operation.run, ramp=ramp)
             operation = dataclasses.replace(rig.operation, run=run, starter_time=0.0)
@@ -262,19 +277,19 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
             slower = dataclasses.replace(
                 rig, operation=operation, drive=with_inertia(inverter_tables, drive, drive.added_inertia)
             )
-            yield slower, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, inverter_tables
+            yield StarterTrial(slower, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, inverter_tables)
 
     for boost in boosts(fed.inverter.boost, "starter.inverter.boost" in tables.given):
-        best = _gentlest(rigs(boost), study, chosen, setting.running, math.inf)
+        best = _gentlest(trials(boost), study, chosen, setting.running, math.inf)
         if best is not None:
             break
     else:
         return Alternative(Way.INVERTER, WayNumbers.of(), {})
-    quiet, starts, numbers = best
-    quiet = dataclasses.replace(quiet, fed_from=None)
-    running, shocks = _runs(study.runs, quiet, on_coupling)
-    result = _as_numbers(setting, running, starts, **numbers)
-    overloads = {name: on_coupling(quiet.drive, run) for name, run in shocks.items()}
+    trial, starts = best
+    fed_rig = dataclasses.replace(trial.rig, fed_from=None)
+    running, shocks = _runs(study.runs, fed_rig, on_coupling)
+    result = _as_numbers(setting, running, starts, **trial.numbers)
+    overloads = {name: on_coupling(fed_rig.drive, run) for name, run in shocks.items()}
     return _tried(study, Way.INVERTER, result, overloads, shocks)
 
 

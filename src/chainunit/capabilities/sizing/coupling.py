@@ -106,12 +106,12 @@ def _effect(drive: Drive, run: xr.Dataset, trip: float, release: float, limit: f
     rows = until.sizes["time"]
     at_end = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
     without = at_gear(drive, run)
-    wanted = goal(without, limit)
-    above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
+    goal_torque = goal(without, limit)
+    above = int(np.argmax(np.abs(gear_torque(drive, run)) > goal_torque))
     return CouplingEffect(
         without,
         with_coupling=max(at_gear(drive, until), at_gear(drive, at_end)),
-        goal=wanted,
+        goal=goal_torque,
         release=max(float(time[max(above - 1, 0)]) - trip, 0.0),
         current=peak(until[f"motor.{drive.motor.current}"].values),
     )

@@ -72,19 +72,17 @@ def duty_of(
     """The duty of a machine with that model of its `organs`, whose values are in the `tables` of the study file; an
     FMU of one that has to be run for it is written to `folder`."""
     machine, feed, w = task.machine, task.operation.feed, task.operation.crank_speed
-    loads = {side: all_on_one(side, feed) for side in SIDES if side in machine.model.sides}
-    normal = cycle(machine, w, feed)
-    one_sided = {side: cycle(machine, w, case) for side, case in loads.items()}
-    sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
-    # if both sides are alike it is the left one
-    heavier = min(sizes, key=lambda size: -size[0])[1] if sizes else None
-    turns = ConstantSpeed(machine, w, (feed, *loads.values()), (normal, *one_sided.values()))
-    normal, *others = organs.turns(turns, tables, folder, backend)
-    one_sided = dict(zip(loads, others, strict=True))
-    demands = task.plan.demands
-    return Duty(
-        normal, one_sided, heavier, cycle_numbers(demands, w, machine.ratio, normal, one_sided, heavier)
-    )
+    feeds = {side: all_on_one(side, feed) for side in SIDES if side in machine.model.sides}
+    normal_of_bars = cycle(machine, w, feed)
+    one_sided_of_bars = {side: cycle(machine, w, feed_there) for side, feed_there in feeds.items()}
+    sizes = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided_of_bars.items()}
+    # if both sides are alike it is the left one, which comes first
+    heavier = max(sizes, key=sizes.__getitem__, default=None)
+    turns = ConstantSpeed(machine, w, (feed, *feeds.values()), (normal_of_bars, *one_sided_of_bars.values()))
+    normal, *turns_of_sides = organs.turns(turns, tables, folder, backend)
+    one_sided = dict(zip(feeds, turns_of_sides, strict=True))
+    numbers = cycle_numbers(task.plan.demands, w, machine.ratio, normal, one_sided, heavier)
+    return Duty(normal, one_sided, heavier, numbers)
 
 
 def _peak(cycle: Cycle) -> float:

@@ -87,11 +87,9 @@ class SizingFindings(Findings):
         if self.weak:
             count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
         best = f"{self.best.motor.designation}: {self.best.reason}"
-        return (
-            f"{best} ({count})"
-            if self.chosen_candidate
-            else f"no motor of the catalogue fits ({count}); {best}"
-        )
+        if self.chosen_candidate:
+            return f"{best} ({count})"
+        return f"no motor of the catalogue fits ({count}); {best}"
 
     @property
     def trade(self) -> tuple[Candidate, Candidate] | None:
@@ -140,15 +138,19 @@ class SizingFindings(Findings):
         """The drive of a study by these findings, with the gear of its `tables`."""
         best, trial, fits = self.best, self.best.trial, self.chosen_candidate is not None
         return DriveProposal(
-            "sizing",
-            self,
-            best.drive,
-            best.motor,
-            as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
-            "Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
-            self.answer,
-            lambda study: SizingFindings.of_study(study.findings).sized(study).sentence,
-            lambda study: SizingFindings.of_study(study.findings).currents_until_trip(study),
+            name="sizing",
+            findings=self,
+            drive=best.drive,
+            motor=best.motor,
+            tables=as_used(
+                with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer
+            ),
+            question="Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
+            reason=self.answer,
+            sentence=lambda study: SizingFindings.of_study(study.findings).sized(study).sentence,
+            currents_until_trip=lambda study: SizingFindings.of_study(study.findings).currents_until_trip(
+                study
+            ),
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
@@ -167,16 +169,16 @@ class SizingFindings(Findings):
         best = self.best
         if study.setup.insufficient or (best.sold is None and best.motor.is_packaged):
             return None
-        items, wanted = best.parts, ""
+        items, limiter = best.parts, ""
         if setting is not None and setting.torque is not None:
             if sold := coupling_of(study.runs, setting, self.couplings):
                 items = [*items, OrderedPart.of("torque limiter", sold)]
             else:
                 torque = number(study.setup.drive.at_motor_shaft(setting.torque), "N.m")
-                wanted = f"a torque limiter that opens at {torque} on the motor's shaft"
+                limiter = f"a torque limiter that opens at {torque} on the motor's shaft"
         unknown = [] if best.sold is None else unknown_limits(best.sold)
         flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""
-        listed = parts_list(items, unknown, flywheel, wanted)
+        listed = parts_list(items, unknown, flywheel, limiter)
         if (needed := self._gear_needed(study, setting)) is not None:
             order, remedy = needed
             decides = order.decides
@@ -201,11 +203,11 @@ class SizingFindings(Findings):
         """The drive with its protection by the runs of the study."""
         setting, trial = self.coupling(study), self.best.trial
         return SizedDrive(
-            self.best,
-            bool(study.setup.insufficient),
-            study.setup.driver_noun,
-            study.findings.verdict.caveat if study.findings.verdict else None,
-            weak_in_star(study.findings) and not study.setup.config.empty_start,
+            best=self.best,
+            insufficient=bool(study.setup.insufficient),
+            driver=study.setup.driver_noun,
+            caveat=study.findings.verdict.caveat if study.findings.verdict else None,
+            needs_empty_start=weak_in_star(study.findings) and not study.setup.config.empty_start,
             gear=ordered_gear(study, setting, self.plan, trial.inertia_factor),
             protection=drive_protection(
                 study, setting, self.alternatives, self.best.motor.nameplate.rated_current

@@ -66,10 +66,8 @@ def gear_order(
     findings = StartFindings.found_in(study.findings)
     starts, overloads = _starts(setup, findings, peaks), _overloads(setup, setting, peaks)
     left_out = tuple(name for name in wrong if name in overloads)
-    starts, overloads = (
-        {name: torque for name, torque in torques.items() if name not in wrong}
-        for torques in (starts, overloads)
-    )
+    starts = {name: torque for name, torque in starts.items() if name not in wrong}
+    overloads = {name: torque for name, torque in overloads.items() if name not in wrong}
     loads = dict(_loads(study, setting, margin, service, starts, overloads))
     least, bare = max(load.rated for load in loads.values()), _overloads(setup, None, peaks)
     permitted = setup.config.drive.gear.start_factor * (1.0 - margin)
@@ -87,11 +85,11 @@ def _loads(
     overloads: Mapping[str, float],
 ) -> Iterator[tuple[str, GearLoad]]:
     """The loads of a gear by name: running, the motor at its rating, and the hardest of the `starts` and of the
-    `overloads`, torques by name [N m]."""
-    gear, kept = study.setup.config.drive.gear, 1.0 - margin
+    `overloads`, torques by name [N m]. For the parts of the rated torque that they may take see `gear_order`."""
+    gear, usable_share = study.setup.config.drive.gear, 1.0 - margin
     running, factor = running_peak(study, at_gear), gear.start_factor
     free = f", {number(margin, '1', 'percent', full=False)} of the rated torque left free" if margin else ""
-    yield "running", GearLoad(running.torque, running_words(study.runs, running.run), kept, free)
+    yield "running", GearLoad(running.torque, running_words(study.runs, running.run), usable_share, free)
     times = f" times the service factor {service:g}"
     if study.setup.plate is not None:
         rated = study.setup.plate.nameplate.torque * study.setup.drive.ratio * gear.efficiency
@@ -106,7 +104,7 @@ def _loads(
         with_coupling = setting is not None and setting.torque and name in setting.effects
         title = f"an overload ({study.runs.title_of(name)}{', with the limiter' if with_coupling else ''})"
         rule = f", permitted {factor:g} x rated{free}"
-        yield "overload", GearLoad(overloads[name], title, factor * kept, rule)
+        yield "overload", GearLoad(overloads[name], title, factor * usable_share, rule)
 
 
 def _starts(

@@ -140,8 +140,8 @@ def is_overtaxed(c: Candidate) -> bool:
 
 
 def spent(c: Candidate, tried: Iterable[Candidate]) -> Candidate | None:
-    """The candidate `c` without runs of its own, if its gear surely does not hold: it has the values of a candidate
-    that was `tried` with another gear, beside the limits of its own gear. None if it has to be tried itself."""
+    """The candidate `c` without runs, if its gear surely does not hold: it gets the runs of a candidate that was
+    `tried` with another gear, and the limits of its gear. None if it has to be tried itself."""
     assert c.sold is not None
     data, transmission = c.sold.data, c.sold.transmission
     limits = {
@@ -154,15 +154,14 @@ def spent(c: Candidate, tried: Iterable[Candidate]) -> Candidate | None:
     }
     for other in tried:
         checks = {name: check for name, check in other.checks.items() if name not in limits}
-        checks |= {
+        of_gear = {
             name: dataclasses.replace(check, limit=limits[name])
             for name, check in other.checks.items()
             if limits.get(name)
         }
-        judged = dataclasses.replace(
-            c, trial=dataclasses.replace(other.trial, checks=checks), runs_with=other.runs_with or other.gear
-        )
-        if any(judged.sizes[name] > SURELY for name in checks if name in limits):
+        trial = dataclasses.replace(other.trial, checks=checks | of_gear)
+        judged = dataclasses.replace(c, trial=trial, runs_with=other.runs_with or other.gear)
+        if any(judged.sizes[name] > SURELY for name in of_gear):
             return judged
     return None
 

@@ -24,6 +24,7 @@ def boosts(first: float, is_given: bool) -> list[float]:
 
 
 def _with_boost(c: Candidate, boost: float) -> Candidate:
+    """The candidate with this boost of its inverter."""
     p = c.drive.parameters
     p = dataclasses.replace(p, inverter=dataclasses.replace(p.inverter, boost=boost))
     return dataclasses.replace(c, drive=dataclasses.replace(c.drive, parameters=p))
@@ -46,8 +47,8 @@ def misses_by_a_hair(c: Candidate) -> bool:
     """Whether the candidate exceeds what the margin leaves of its limits by so little, and in such checks, that the
     ratio above may do."""
     over = [name for name in c.checks if c.exceeds(name)]
-    left = HAIR * (1.0 - c.margin)
-    return bool(over) and all(name in _RELIEVED and c.sizes[name] <= left for name in over)
+    usable = HAIR * (1.0 - c.margin)
+    return bool(over) and all(name in _RELIEVED and c.sizes[name] <= usable for name in over)
 
 
 def inverter_needs(best: Candidate, is_given: bool) -> Iterator[str]:

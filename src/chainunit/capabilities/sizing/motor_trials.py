@@ -157,24 +157,25 @@ class MotorTrials:
     def _over_gears(
         self, motor: CatalogueMotor, ratio: float, judge: Callable[[Candidate], Candidate]
     ) -> list[Candidate]:
-        """The candidates with the gears about this ratio, up to the first that fits with the margin."""
-        judged: list[Candidate] = []
-        run: list[Candidate] = []
+        """The candidates with the gears about this ratio, up to the first that fits with the margin. A gear that
+        surely does not hold by the runs with an earlier one has none of its own."""
+        candidates: list[Candidate] = []
+        with_runs: list[Candidate] = []
         for gear in rows_for(self.task.gears, ratio, _TOLERANCE, self.plan.objective):
-            if not helps(gear, run):
+            if not helps(gear, with_runs):
                 continue
             c = self.candidate(motor, gear=gear)
-            if (ruled_out := spent(c, run)) is not None:
-                judged.append(ruled_out)
+            if (ruled_out := spent(c, with_runs)) is not None:
+                candidates.append(ruled_out)
                 continue
             c = judge(c)
             if c.fits and not c.worst_start:
                 c = self.with_least_boost(c, worst_start=True)
-            judged.append(c)
-            run.append(c)
+            candidates.append(c)
+            with_runs.append(c)
             if c.keeps_margin:
                 break
-        return judged
+        return candidates
 
     def best_of(self, motor: CatalogueMotor) -> Candidate:
         """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its
@@ -201,16 +202,18 @@ class MotorTrials:
         a load changes faster than the cage of the motor follows, a small flywheel may make its torque less even."""
         numbers = self.duty.numbers
         at_motor = bare.drive.flywheel_ratio**2
-        there = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
+        present = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
         trials: list[Candidate] = []
 
         def trial_with(flywheel: float) -> Candidate:
+            """The candidate with a flywheel of this inertia at the motor [kg m2], judged."""
             drive = with_inertia(self.task.tables, bare.drive, flywheel * at_motor)
             candidate = dataclasses.replace(bare, drive=drive)
             trials.append(self.judged(candidate))
             return candidate
 
         def heavy_enough(candidate: Candidate) -> bool:
+            """Whether a heavier flywheel is no use."""
             if candidate.checks and not candidate.starts:
                 # it stalls for want of inertia, unless it starts with less
                 return any(c.starts for c in trials if c.drive.added_inertia < candidate.drive.added_inertia)
@@ -223,7 +226,7 @@ class MotorTrials:
             first.stop = MEAN
             return first
         heaviest = heaviest_started(first)
-        below, flywheel = 0.0, min(_SMALL * there, heaviest)
+        below, flywheel = 0.0, min(_SMALL * present, heaviest)
         last = trial_with(flywheel)
         while flywheel < heaviest and not (heavy_enough(last) or _has_even_torque(last)):
             below, flywheel = flywheel, min(_LARGER * flywheel, heaviest)
@@ -241,17 +244,16 @@ class MotorTrials:
 
 
 def _nearest(trials: list[Candidate]) -> Candidate:
-    """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
-    best, last = (
-        min(trials, key=lambda c: c.violation),
-        max(trials, key=lambda c: c.drive.added_inertia),
-    )
-    best.heaviest = last.drive.added_inertia
-    if not last.checks:
+    """The trial that comes nearest to all limits; where none starts, the one without a flywheel. It gets the heaviest
+    flywheel that was tried, and the reason to stop there (`stop`): the first limit that this flywheel exceeds."""
+    best = min(trials, key=lambda c: c.violation)
+    heaviest = max(trials, key=lambda c: c.drive.added_inertia)
+    best.heaviest = heaviest.drive.added_inertia
+    if not heaviest.checks:
         best.stop = FAILED
-    elif last.starts:
-        worse = (name for name in (*WORSE_WITH_INERTIA, "starts") if last.exceeds(name))
-        best.stop = next(worse, EVEN if _has_even_torque(last) else "start")
+    elif heaviest.starts:
+        exceeded = (name for name in (*WORSE_WITH_INERTIA, "starts") if heaviest.exceeds(name))
+        best.stop = next(exceeded, EVEN if _has_even_torque(heaviest) else "start")
     else:
         best.stop = UNSTARTED if any(c.starts for c in trials) else "start"
     return best

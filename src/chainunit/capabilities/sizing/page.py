@@ -95,24 +95,15 @@ def _parts(drive: SizedDrive, x: SizedDrive) -> Iterator[b.Block]:
         )
         yield b.Text(sentence, "note", "long")
         return
-    rows = [
-        b.TableRow(
-            (
-                capital(item.kind),
-                shown.designation,
-                shown.order_number if item.order_number else "-",
-                exact(shown.price, none="-"),
-            )
-        )
-        for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
-    ]
+    rows, sources = [], {}
+    for item, shown in zip(drive.parts.items, x.parts.items, strict=True):
+        order_number, price = shown.order_number if item.order_number else "-", exact(shown.price, none="-")
+        rows.append(b.TableRow((capital(item.kind), shown.designation, order_number, price)))
+        sources[item.source] = shown.source
     if len(rows) > 1 and drive.parts.total is not None:
         rows.append(b.TableRow(("These parts together", "", "", exact(x.parts.total))))
     columns = b.heads("part", "designation", "order number", "price")
     yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
-    sources = {
-        item.source: shown.source for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
-    }
     yield b.Text(line("Source of their values: ", *join(sources.values()), "."), "note", "long")
     yield from (b.Text(remark, form="long") for remark in x.parts.open)
 
@@ -131,8 +122,8 @@ def judgements(findings: StudyFindings) -> Iterator[b.Block]:
     sizing = SizingFindings.found_in(findings)
     if sizing is not None and sizing.nearest is not None:
         best = cited(sizing, "findings.sizing").candidates[0]
-        rest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
-        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), rest), form="long")
+        nearest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
+        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), nearest), form="long")
 
 
 def _gear(candidate: Candidate, x: Candidate) -> Line:
@@ -196,9 +187,9 @@ def _starter(setup: StudySetup, drive: SizedDrive, x: SizedDrive, numbers: Drive
 def _winding(setup: StudySetup) -> str:
     """The winding that a start in star and delta needs: one for the voltage of the supply in delta."""
     supply = 0.0 if setup.plate is None else setup.plate.nameplate.voltage
-    in_star, other = (
-        10.0 * round(supply * factor / 10.0) for factor in (math.sqrt(3.0), 1.0 / math.sqrt(3.0))
-    )
+    # to the tens of volts of a nameplate
+    in_star = 10.0 * round(supply * math.sqrt(3.0) / 10.0)
+    other = 10.0 * round(supply * (1.0 / math.sqrt(3.0)) / 10.0)
     return (
         f"motor winding {supply:g}/{in_star:g} V, in delta at the {supply:g} V of the supply (one of "
         f"{other:g}/{supply:g} V, usual up to 3 kW, stays in star there and has no star-delta start)"
@@ -279,16 +270,19 @@ def _numbers(study: StudyRecord, findings: SizingFindings, drive: SizedDrive) ->
 def _best(setup: StudySetup, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
     """The sentences on what is ordered, and on the reason for the choice."""
     doubt = line(" (", cited(drive.caveat, "verdict.model.caveat"), ")") if drive.caveat else ()
-    # a motor that does not suffice is not ordered
     parts = () if drive.parts is None else drive.parts.items
-    motor = [line("motor ", best.designation, " of ", source) for source in _data(setup)]
-    order: list[Line] = [line(title, *_how_to_order(drive, x, 0)) for title in motor]
+    cited_parts = () if x.parts is None else x.parts.items
+    order: list[Line] = []
+    # the motor is the first part
+    for motor_data in _data(setup):
+        order.append(line("motor ", best.designation, " of ", motor_data, *_how_to_order(drive, x, 0)))
     if not any(part.kind == "gear" for part in parts):
         order += (*_belt(x.belt), *_gear_torque(x))
-    for k, item in enumerate(x.parts.items if x.parts is not None else ()):
-        if k:
-            order.append(line(f"{parts[k].kind} ", item.designation, *_how_to_order(drive, x, k)))
+    for k in range(1, len(cited_parts)):
+        designation = cited_parts[k].designation
+        order.append(line(f"{parts[k].kind} ", designation, *_how_to_order(drive, x, k)))
     order += _starter(setup, drive, x, best.numbers)
+    # a motor that does not suffice is not ordered
     if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
     begin = "Insufficient: " if drive.insufficient else "Chosen: "
@@ -318,24 +312,16 @@ def _candidates(findings: SizingFindings, x: SizingFindings, row_count: int) -> 
     if any(candidate.sold is not None for candidate in findings.candidates):
         # the gears have a table of their own
         titles = {name: title for name, title in titles.items() if not name.startswith("gear")}
-    rows = [
-        b.TableRow(
-            (
-                line(shown.designation, Aside(_behind(candidate, shown))),
-                shown.verdict or "",
-                _flywheel(candidate, shown),
-                number(shown.numbers.mass),
-                *(
-                    _share(candidate.checks[name], shown.checks[name]) if name in candidate.checks else ""
-                    for name in titles
-                ),
-            ),
-            line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", shown.reason),
-            _SEVERITY.get(candidate.verdict, "bad"),
-            "both" if i < row_count else "long",
-        )
-        for i, (candidate, shown) in enumerate(zip(findings.candidates, x.candidates, strict=True))
-    ]
+    rows = []
+    for k, (candidate, shown) in enumerate(zip(findings.candidates, x.candidates, strict=True)):
+        checks = candidate.checks
+        shares = (_share(checks[name], shown.checks[name]) if name in checks else "" for name in titles)
+        drive = line(shown.designation, Aside(_behind(candidate, shown)))
+        mass = number(shown.numbers.mass)
+        cells = (drive, shown.verdict or "", _flywheel(candidate, shown), mass, *shares)
+        reason = line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", shown.reason)
+        severity = _SEVERITY.get(candidate.verdict, "bad")
+        rows.append(b.TableRow(cells, reason, severity, "both" if k < row_count else "long"))
     long = (b.Column(title, form="long") for title in ("flywheel", "mass", *titles.values()))
     return b.Table(
         tuple(rows),
@@ -383,15 +369,18 @@ def _gears(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Table]:
 
 
 def _ways(runs: StudyRuns, protection: DriveProtection, x: DriveProtection) -> Iterator[b.Table]:
-    """A row for each way to a coupling that a start does not open."""
+    """A row for each way to a coupling that a start does not open; `x` is the cited `protection`."""
+    opened = {
+        way.way: "; ".join(map(runs.title_of, way.opens)) or "nothing" for way in protection.alternatives
+    }
     return table(
-        zip(protection.alternatives, x.alternatives, strict=True),
-        ("way", lambda row: row[1].way),
-        ("set to", lambda row: number(row[1].numbers.setting)),
-        ("running", lambda row: number(row[1].numbers.running)),
-        ("a start", lambda row: number(row[1].numbers.start)),
-        ("start-up", lambda row: number(row[1].numbers.start_time)),
-        ("opens or slips where", lambda row: "; ".join(map(runs.title_of, row[0].opens)) or "nothing"),
+        x.alternatives,
+        ("way", lambda row: row.way),
+        ("set to", lambda row: number(row.numbers.setting)),
+        ("running", lambda row: number(row.numbers.running)),
+        ("a start", lambda row: number(row.numbers.start)),
+        ("start-up", lambda row: number(row.numbers.start_time)),
+        ("opens or slips where", lambda row: opened[row.way]),
         title="Ways to a torque limiter: its setting, and the torques of running and of a start, at the "
         f"{runs.drive.driver_noun}",
         numeric=False,
@@ -423,6 +412,7 @@ def _behind(candidate: Candidate, x: Candidate) -> Line:
 
 
 def _flywheel(candidate: Candidate, x: Candidate) -> Line:
+    """The inertia of the flywheel of a candidate, and its disc."""
     if not candidate.drive.added_inertia:
         return "none"
     return line(number(x.flywheel_numbers.J), *map(Aside, _disc(candidate, x)))

@@ -112,13 +112,13 @@ def choice(
 ) -> tuple[Candidate, dict[int, Criterion]]:
     """The preferred one of candidates that fit, and by the `id` of each other one the criterion by which it was
     left out."""
-    left = sorted(fitting, key=lambda c: (c.motor.designation, c.gear))
+    rivals = sorted(fitting, key=lambda c: (c.motor.designation, c.gear))
     dropped: dict[int, Criterion] = {}
     for criterion, keep in _steps(larger, objective):
-        kept = keep(left)
-        dropped |= {id(c): criterion for c in left if not any(c is candidate for candidate in kept)}
-        left = kept
-    return left[0], dropped | {id(c): Criterion.USE for c in left[1:]}
+        equals = keep(rivals)
+        dropped |= {id(c): criterion for c in rivals if not any(c is candidate for candidate in equals)}
+        rivals = equals
+    return rivals[0], dropped | {id(c): Criterion.USE for c in rivals[1:]}
 
 
 def _steps(
@@ -187,7 +187,7 @@ def _less_used(left: list[Candidate]) -> list[Candidate]:
 
 def _judge(c: Candidate) -> None:
     """Set verdict and reason of a candidate by its own checks."""
-    c.criterion, rest = None, ""
+    c.criterion, suffix = None, ""
     if c.fits:
         loads = [check for name, check in c.checks.items() if name not in TOLERANCES]
         most = max(loads, key=lambda check: check.utilisation or 0.0)
@@ -198,14 +198,14 @@ def _judge(c: Candidate) -> None:
         c.verdict = Standing.REJECTED
     elif not c.starts:
         c.verdict, c.reason = Standing.REJECTED, _unstarted(c)
-        rest = _flywheels(c)
+        suffix = _flywheels(c)
     else:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
-        rest = _flywheels(c) + (f"; {c.remedy}" if c.remedy else "")
+        suffix = _flywheels(c) + (f"; {c.remedy}" if c.remedy else "")
     if c.disc:
         c.reason += f", with a flywheel of {c.flywheel_words}"
-    c.reason += rest
+    c.reason += suffix
 
 
 def _flywheels(c: Candidate) -> str:
@@ -270,11 +270,10 @@ def _behind(c: Candidate, best: Candidate) -> str:
             return f"its {lacking} {'have' if ' and ' in lacking else 'has'} no price"
         return f"dearer: {price_words(c.price)}"
     if c.criterion is Criterion.COST:
-        return (
-            "dearer than the chosen one"
-            if c.price is not None
-            else f"heavier than the chosen one: {_mass(c)}"
-        )
+        if c.price is not None:
+            return "dearer than the chosen one"
+        with_flywheel = " with its flywheel" if c.disc else ""
+        return f"heavier than the chosen one: {number(c.mass, 'kg')}{with_flywheel}"
     if c.criterion is Criterion.USE:
         is_more = c.use > best.use + ALIKE
         return "more used than the chosen one" if is_more else "as good as the chosen one"
@@ -294,6 +293,7 @@ def _units(c: Candidate) -> str:
 
 
 def _weakened(c: Candidate) -> str:
+    """The field weakening of a candidate, in words."""
     rated = number(c.motor.nameplate.frequency, "Hz")
     return (
         f"runs at {number(c.trial.frequency, 'Hz')} in field weakening, with less torque than at its {rated}"
@@ -302,10 +302,6 @@ def _weakened(c: Candidate) -> str:
 
 def _margin(c: Candidate) -> str:
     return number(c.margin, "1", "percent", full=False)
-
-
-def _mass(c: Candidate) -> str:
-    return f"{number(c.mass, 'kg')} with its flywheel" if c.disc else number(c.mass, "kg")
 
 
 def _class(c: Candidate) -> str:

@@ -18,12 +18,10 @@ from ...study.starts import StartFindings, transient_words, weak_in_star
 from ...study.verdict import STEADY
 from .candidate import Candidate, TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
-from .gear_order import gear_order
+from .gear_order import GearOrder, gear_order
 from .parts import PartsList
 from .protection import Alternative, CouplingEffect, Obstacle, Setting, WayNumbers
 from .table import SizingPlan
-
-_OF = {"start": "largest torque by load and acceleration"}
 
 
 @result
@@ -53,34 +51,40 @@ def ordered_gear(
     order = gear_order(study, setting, margin, service)
     if order is None or not study.setup.drive.is_geared:
         return None
-    decides = order.decides
-    reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
-    if order.without > order.rated:
-        reason += f"; without the torque limiter {number(order.without, 'N.m')}"
-    if order.left_out:
-        names = ", ".join(map(study.runs.title_of, order.left_out))
-        reason += (
-            f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
-        )
+    reason = _deciding_load(study.runs, order)
     free = number(margin, "1", "percent", full=False)
     title = (
         f"gear, rated output torque at least, with the margin of {free} above running; decided by {reason}"
     )
+    loads = {}
+    for name, load in order.loads.items():
+        size = "largest torque by load and acceleration" if name == "start" else "largest torque"
+        loads[name] = _torque(load.torque, f"{size} of {load.words} on the output of the gear")
+    service_title = f"service factor fB of the gear: {plan.service_words(inertia_factor)}"
     transient = None
     if order.transient is not None:
         transient = _torque(order.transient, transient_words(study.setup))
     return OrderedGear(
-        InUnit(order.rated, "N.m", title=title),
-        {
-            name: _torque(
-                load.torque, f"{_OF.get(name, 'largest torque')} of {load.words} on the output of the gear"
-            )
-            for name, load in order.loads.items()
-        },
-        InUnit(service, "1", title=f"service factor fB of the gear: {plan.service_words(inertia_factor)}"),
-        transient,
-        reason,
+        rated_torque=InUnit(order.rated, "N.m", title=title),
+        loads=loads,
+        service_factor=InUnit(service, "1", title=service_title),
+        transient=transient,
+        decided_by=reason,
     )
+
+
+def _deciding_load(runs: StudyRuns, order: GearOrder) -> str:
+    """The load that decides the order of a gear in words, with its torque, and the runs that are left out."""
+    decides = order.decides
+    text = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
+    if order.without > order.rated:
+        text += f"; without the torque limiter {number(order.without, 'N.m')}"
+    if order.left_out:
+        names = ", ".join(map(runs.title_of, order.left_out))
+        text += (
+            f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
+        )
+    return text
 
 
 def _torque(value: float, title: str) -> InUnit:
@@ -128,27 +132,18 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
     factor = plan.belt_factor(trial.inertia_factor, is_on_line)
     belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
     power = number(plate.power, "W")
+    power_title = "V-belt, design power, for which its maker gives number and tension of the belts: "
+    power_title += f"rated {power} of the motor times the service factor"
+    factor_title = f"service factor of the belt: {plan.belt_words(trial.inertia_factor, is_on_line)}"
+    ratio_title = f"ratio of the belt with these pulleys; in the runs {ratio:.4g}"
     return OrderedBelt(
-        InUnit(
-            belt.design_power,
-            "W",
-            title="V-belt, design power, for which its maker gives number and tension of the belts: "
-            f"rated {power} of the motor times the service factor",
-        ),
-        InUnit(
-            factor,
-            "1",
-            title=f"service factor of the belt: {plan.belt_words(trial.inertia_factor, is_on_line)}",
-        ),
-        InUnit(belt.speed, "m/s", title="belt speed"),
-        InUnit(
-            belt.large / belt.small,
-            "1",
-            title=f"ratio of the belt with these pulleys; in the runs {ratio:.4g}",
-        ),
-        InUnit(belt.small, "m", "millimetres", title="pulley of the motor, pitch diameter"),
-        InUnit(belt.large, "m", "millimetres", title="other pulley, pitch diameter"),
-        f"{belt.section}, narrow V-belts",
+        design_power=InUnit(belt.design_power, "W", title=power_title),
+        service_factor=InUnit(factor, "1", title=factor_title),
+        speed=InUnit(belt.speed, "m/s", title="belt speed"),
+        ratio=InUnit(belt.large / belt.small, "1", title=ratio_title),
+        small_pulley=InUnit(belt.small, "m", "millimetres", title="pulley of the motor, pitch diameter"),
+        large_pulley=InUnit(belt.large, "m", "millimetres", title="other pulley, pitch diameter"),
+        section=f"{belt.section}, narrow V-belts",
     )
 
 
@@ -297,14 +292,8 @@ def drive_protection(
         overloads=_peaks(study.runs, setting.overloads, "opens it", setting.opens),
         disturbances=_peaks(study.runs, setting.disturbances, "a nuisance trip", setting.nuisances),
         alternatives=[
-            TriedWay(
-                alternative.way,
-                way_words(study, alternative, setting),
-                alternative.numbers,
-                alternative.opens,
-                _effects(study.runs, alternative.effects),
-            )
-            for alternative in alternatives
+            TriedWay(x.way, way_words(study, x, setting), x.numbers, x.opens, _effects(study.runs, x.effects))
+            for x in alternatives
         ],
     )
 
@@ -322,15 +311,13 @@ def _peaks(
 def _effects(runs: StudyRuns, effects: Mapping[str, CouplingEffect]) -> dict[str, dict[str, InUnit]]:
     """The effects of a torque limiter as it was tried, by overload."""
     titles = {"without": "without a coupling", "with_coupling": "with it"}
-    return {
-        name: {
-            key: _torque(
-                getattr(effect, key), f"{runs.title_of(name)}: peak at the output of the gear, {phrase}"
-            )
-            for key, phrase in titles.items()
+    data = {}
+    for name, effect in effects.items():
+        title = f"{runs.title_of(name)}: peak at the output of the gear"
+        data[name] = {
+            key: _torque(getattr(effect, key), f"{title}, {words}") for key, words in titles.items()
         }
-        for name, effect in effects.items()
-    }
+    return data
 
 
 def _relay(study: StudyRecord, rated: float) -> MotorProtection:
@@ -339,21 +326,19 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.setup.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    title, caveat = class_words(study.runs.relay_class), _too_slow(study) or _tolerance(study)
+    title, tolerance = class_words(study.runs.relay_class), _too_slow(study) or _tolerance(study)
     trip_class = {"value": title, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if not study.setup.drive.star:
-        return MotorProtection(
-            InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
-        )
-    place = (
-        "in the phases of the delta, behind the main contactor, where it usually sits: 1/sqrt(3) of the rated"
-    )
+        setting = InUnit(rated, "A", title="thermal relay, setting")
+        return MotorProtection(setting, None, trip_class, "relay", tolerance)
+    place = "in the phases of the delta, behind the main contactor, where it usually sits"
+    in_phases = f"thermal relay {place}: 1/sqrt(3) of the rated current, setting"
     return MotorProtection(
-        InUnit(rated / math.sqrt(3.0), "A", title=f"thermal relay {place} current, setting"),
-        InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
-        trip_class,
-        "relay in the phases of the delta",
-        caveat,
+        relay_current=InUnit(rated / math.sqrt(3.0), "A", title=in_phases),
+        line_current=InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
+        relay_class=trip_class,
+        device="relay in the phases of the delta",
+        tolerance=tolerance,
     )
 
 
@@ -378,5 +363,5 @@ def _tolerance(study: StudyRecord) -> str | None:
     if holding <= HEAVIEST:
         phrase, late = f"one of {class_words(holding)} holds", ", but trips too late with the rotor locked"
     more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
-    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; {phrase}{late}"
-    return None if holding == study.runs.relay_class else said
+    text = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; {phrase}{late}"
+    return None if holding == study.runs.relay_class else text

@@ -137,12 +137,12 @@ def size(
     notes += _needs(candidates[0], trials)
     tried = len({c.motor.designation for c in candidates})
     return SizingFindings(
-        task.plan,
-        duty,
-        candidates,
-        notes,
-        len(motors),
-        len(motors) - len(strong),
+        plan=task.plan,
+        duty=duty,
+        candidates=candidates,
+        notes=notes,
+        motors=len(motors),
+        weak=len(motors) - len(strong),
         tried=tried,
         gears=task.gears,
         couplings=task.couplings,
@@ -183,9 +183,9 @@ def check_ratios(
         if any((1.0 - SPEED_DEVIATION) * least <= x <= (1.0 + SPEED_DEVIATION) * most for x in ratios):
             return
         needed.setdefault(plate.poles, least)
-    wanted = sorted((ratio, poles) for poles, ratio in needed.items())
-    near, _ = min(wanted, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
-    choices = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
+    needs = sorted((ratio, poles) for poles, ratio in needed.items())
+    near, _ = min(needs, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
+    choices = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in needs)
     if key == "sizing.gear_kind":
         raise InputError(
             f'{key} = "none": no motor of the catalogue turns at {number(w, "rad/s", "speed")} on the line: '
@@ -226,13 +226,15 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
     candidates, least = _least_power(trials, motors, says)
     tried = {c.motor.designation for c in candidates}
     spared: list[CatalogueMotor] = []
-    gears = [gear.price or math.inf for gear in trials.task.gears]
-    cheapest_gear = min(gears, default=0.0)
-    left = [m for m in motors if m.nameplate.power >= least and m.designation not in tried]
-    rest = iter(sorted(left, key=lambda m: m.price or math.inf) if objective == PRICE else left)
-    following = next(rest, None)
+    cheapest_gear = min((gear.price or math.inf for gear in trials.task.gears), default=0.0)
+    untried = [m for m in motors if m.nameplate.power >= least and m.designation not in tried]
+    if objective == PRICE:
+        untried.sort(key=lambda m: m.price or math.inf)
+    queue = iter(untried)
+    following = next(queue, None)
 
     def is_over() -> bool:
+        """Whether no motor of the queue can become the best one."""
         if following is None:
             return True
         if len(tried) < demands.candidates:
@@ -242,6 +244,7 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
         return _is_settled(candidates, following, demands.larger)
 
     def next_spared() -> CatalogueMotor | None:
+        """A motor that was tried without flywheels alone, and may become the best one with them."""
         return next((m for m in spared if not _comes_after(m, candidates, demands.larger)), None)
 
     while True:
@@ -257,7 +260,7 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
                     c.stop = SPARED
             candidates += tries
             tried.add(following.designation)
-            following = next(rest, None)
+            following = next(queue, None)
         while (motor := next_spared()) is not None:
             says(motor)
             spared.remove(motor)
@@ -295,11 +298,13 @@ def _least_power(
         return sorted(same, key=lambda m: poles_rank(m.nameplate.poles))
 
     def suffices_bare(n: int) -> bool:
+        """Whether the best motor of the power number `n` is strong enough without a flywheel."""
         motor = motors_of(powers[n])[0]
         says(motor)
         return not _is_weak(trials.candidates_of(motor, trials.with_least_boost)[-1])
 
     def suffices(n: int) -> bool:
+        """Whether a motor of the power number `n` is strong enough, with or without a flywheel."""
         for motor in motors_of(powers[n]):
             says(motor)
             tries = trials.candidates_of(motor)
@@ -372,8 +377,8 @@ def _would_do(other: Candidate, best: Candidate) -> str:
         return text
     starts = [c.checks["gear_start"].value for c in (best, other) if "gear_start" in c.checks]
     if len(starts) == 2:
-        here, there = (number(torque, "N.m") for torque in starts)
-        text += f", and its start would put {there} on the gear in place of {here}"
+        best_start, other_start = (number(torque, "N.m") for torque in starts)
+        text += f", and its start would put {other_start} on the gear in place of {best_start}"
     if best.price is not None and other.price is not None:
         text += f", at a price of {other.price:g} in place of {best.price:g}"
     return text
@@ -383,8 +388,8 @@ def _wishes_of(c: Candidate) -> set[str]:
     """The checks of wishes that alone reject a candidate, or for which it has its flywheel."""
     over = {name for name in c.checks if c.exceeds(name)}
     sized = {max((c.sizes.get(name, 0.0), name) for name in EVENED)[1]} if c.drive.added_inertia else set()
-    rest = over - set(_WISHES) - (set(WORSE_WITH_INERTIA) if c.drive.added_inertia else set())
-    return set() if rest else (over | sized) & set(_WISHES)
+    other_limits = over - set(_WISHES) - (set(WORSE_WITH_INERTIA) if c.drive.added_inertia else set())
+    return set() if other_limits else (over | sized) & set(_WISHES)
 
 
 def _value(demands: Sizing, key: str) -> str:
@@ -442,13 +447,11 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
     if best.drive.follows:
         yield from inverter_needs(best, trials.has_given_boost)
     if best.unit is None:
-        largest = UNITS[trials.plan.gear_kind][-1]
-        end = (
-            f"even of makers with large ratios ends at about {largest.made:g}"
-            if trials.is_made
-            else (f"ends at about {largest.largest:g}")
-        )
-        yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
+        unit = UNITS[trials.plan.gear_kind][-1]
+        end = f"ends at about {unit.largest:g}"
+        if trials.is_made:
+            end = f"even of makers with large ratios ends at about {unit.made:g}"
+        yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {unit.title} {end}."
 
 
 def _is_cheapest(candidates: list[Candidate], price: float) -> bool:
@@ -499,17 +502,17 @@ def _without_flywheel(
         return None
     tried = {c.motor.designation for c in candidates}
     poles = best.motor.nameplate.poles
-    rest = [
+    larger = [
         m
         for m in motors
         if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
     ]
-    # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
-    least = None
-    while rest:
-        middle = len(rest) // 2
-        candidate = trials.candidates_of(rest[middle], trials.with_least_boost)[-1]
+    # halve the list: above a motor that is too weak, below one that fits or is too hard on the gear in its start
+    smallest = None
+    while larger:
+        middle = len(larger) // 2
+        candidate = trials.candidates_of(larger[middle], trials.with_least_boost)[-1]
         if candidate.keeps_margin:
-            least = candidate
-        rest = rest[middle + 1 :] if _is_weak(candidate) else rest[:middle]
-    return least
+            smallest = candidate
+        larger = larger[middle + 1 :] if _is_weak(candidate) else larger[:middle]
+    return smallest

@@ -176,9 +176,11 @@ class Trial:
 
     @cached_property
     def fluctuation(self) -> float:
-        """(Largest - least)/mean of the speed."""
+        """(Largest - least)/mean of the machine's speed, by the later half of steady running, which is settled
+        best."""
         w, mean = self._speed_behind(self.steady), self.speed_behind
-        return float(np.ptp(w[len(w) // 2 :])) / mean if mean > 0.0 else math.inf
+        later_half = w[len(w) // 2 :]
+        return float(np.ptp(later_half)) / mean if mean > 0.0 else math.inf
 
     @cached_property
     def duty(self) -> DutyPeak:
@@ -305,8 +307,7 @@ class Trial:
         )
 
     def checks(self) -> dict[str, Check]:
-        """Each value beside its limit, by name; the value is None where the machine does not get up to
-        speed."""
+        """Each value beside its limit, by name; the value is None where the machine does not get up to speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
         run_up = motor_run_up(self.drive, self._from_rest, self.start_time)
@@ -407,6 +408,7 @@ def try_motor(
         window += turn
     rig = Rig(operation, drive, files)
     shifts, one_sided = [], {}
+    # the start, steady running, and from there all feed on each side in turn
     with rig.from_rest() as simulation:
         start = simulation.run(window, rig.step)
         if operation.empty_start:
@@ -434,9 +436,11 @@ def try_motor(
 def starts_by_heat(
     p: Any, running_heat: float, start_heat: float, cooling: float, temperature: float
 ) -> float:
-    """Starts per hour that bring the winding to its permitted `temperature` [K], with the `running_heat` [W]
-    and the `start_heat` [J] of each start; 0 where running alone is too hot."""
-    spare = (temperature - p.ambient.T) * cooling / p.stator.R_th - running_heat
+    """Starts per hour that bring the winding of a motor with the parameters `p` to its permitted `temperature` [K],
+    with the `running_heat` [W] and the `start_heat` [J] of each start; `cooling` is the share at the present
+    speed. 0 where running alone is too hot, a million where a start makes no heat."""
+    dissipated = (temperature - p.ambient.T) * cooling / p.stator.R_th
+    spare = dissipated - running_heat
     if spare <= 0.0:
         return 0.0
     return 3600.0 * spare / start_heat if start_heat > 0.0 else 1e6

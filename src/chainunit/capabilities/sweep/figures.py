@@ -51,16 +51,17 @@ def over_parameters(summary: SweepSummary) -> Iterator[fig.Figure]:
 def _levels(z: Any) -> tuple[float, ...]:
     """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1; levels that grow where values
     reach over decades, or where most of them would stand in one even class."""
-    low, most, high = (float(level) for level in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
+    low, below_most, high = (float(level) for level in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
     if not high - low > 1e-9 * max(abs(low), abs(high)):
-        wide = max(abs(low), 1e-9)
-        return (low - wide, low, low + wide)
-    raw = (high - low) / _CLASSES
-    if low > 0.0 and (high > WIDE * low or (most < low + raw and high > 4.0 * low)):
+        # all values are equal
+        margin = max(abs(low), 1e-9)
+        return (low - margin, low, low + margin)
+    exact_step = (high - low) / _CLASSES
+    if low > 0.0 and (high > WIDE * low or (below_most < low + exact_step and high > 4.0 * low)):
         return _wide_levels(low, high)
-    size = 10.0 ** np.floor(np.log10(raw))
+    power_of_ten = 10.0 ** np.floor(np.log10(exact_step))
     for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0):
-        step = factor * size
+        step = factor * power_of_ten
         first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
         if last - first <= _CLASSES:
             break
@@ -76,8 +77,8 @@ def _wide_levels(low: float, high: float) -> tuple[float, ...]:
         last = min(k for k, x in enumerate(levels) if x >= high)
         if last - first <= _CLASSES:
             return tuple(levels[first : last + 1])
-    some = {*levels[first : last : -(-(last - first) // _CLASSES)], levels[last]}
-    return tuple(sorted(some))
+    thinned = {*levels[first : last : -(-(last - first) // _CLASSES)], levels[last]}
+    return tuple(sorted(thinned))
 
 
 def _map(summary: SweepSummary, name: str) -> fig.Figure:
@@ -139,14 +140,11 @@ def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
     ]
     dots = "o" if len(x) <= 40 else ""
     names = [name for name in findings.results if name in summary.extremes]
-    for figure_name, file, some in _numbered("curves", names, _MOST_ROWS):
-        rows = (
-            (
-                _axis(findings.variables[name]),
-                [fig.Curve(name, x, part[name].values, 0, dots, in_legend=False), *marks],
-            )
-            for name in some
-        )
+    for figure_name, file, shown_names in _numbered("curves", names, _MOST_ROWS):
+        rows = []
+        for name in shown_names:
+            curve = fig.Curve(name, x, part[name].values, 0, dots, in_legend=False)
+            rows.append((_axis(findings.variables[name]), [curve, *marks]))
         yield fig.Figure(
             figure_name,
             f"Results over {parameter.name}: {parameter.variable.description}",
@@ -176,10 +174,11 @@ def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ..
 def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     """Bars of the rank correlation of each result with each parameter, the largest share of the variance first; none
     of two parameters."""
-    parameters, results = summary.findings.plan.parameters, list(summary.influences.items())
-    for figure_name, file, some in _numbered("tornado", results if len(parameters) > 2 else [], _MOST_PANELS):
+    parameters = summary.findings.plan.parameters
+    results = list(summary.influences.items()) if len(parameters) > 2 else []
+    for figure_name, file, shown_results in _numbered("tornado", results, _MOST_PANELS):
         panels = []
-        for name, influences in some:
+        for name, influences in shown_results:
             size = {
                 parameter: (influence.share.value if influence.share else 0.0, abs(influence.rank))
                 for parameter, influence in influences.items()
@@ -208,9 +207,9 @@ def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
     """The share of the points below each value of each result; none of a sweep without a spread."""
     shares, sample = np.linspace(0.0, 1.0, 201), summary.sample
     names = [name for name in summary.influences if summary.spread.spread and len(sample[name])]
-    for figure_name, file, some in _numbered("spread", names, _MOST_PANELS):
+    for figure_name, file, shown_names in _numbered("spread", names, _MOST_PANELS):
         panels = []
-        for name in some:
+        for name in shown_names:
             x = np.quantile(sample[name][np.isfinite(sample[name])], shares)
             items: list[fig.Item] = [fig.Curve("share of the points below", x, shares, in_legend=False)]
             items += [fig.Mark(q, "5 %, 95 %", axis="y", look="thin") for q in (0.05, 0.95)]

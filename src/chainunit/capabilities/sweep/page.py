@@ -76,6 +76,7 @@ def _store_in(swept: SweptStudy, folder: Path) -> Path:
 
 
 def _opening(x: SweepSummary) -> Iterator[b.Block]:
+    """The size of the sweep, points without results, and limits of the organs."""
     ranges = join(_range(name, swept) for name, swept in x.parameters.items())
     size = "{} points, {}, over {}; {} of them have results."
     yield b.Text(filled(size, exact(x.size.points), x.size.method, ranges, exact(x.size.feasible)))
@@ -92,6 +93,7 @@ def _opening(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _range(name: str, swept: SweptRange) -> Line:
+    """A parameter with the range that is swept, or with its tolerance."""
     tolerance = exact(swept.tolerance)
     if tolerance.value is None:
         return filled("{} {} to {}", Name(name), exact(swept.low), exact(swept.high))
@@ -106,46 +108,40 @@ def _columns(names: Iterable[str]) -> tuple[b.Column, ...]:
 
 
 def _best(x: SweepSummary) -> Iterator[b.Block]:
+    """The best points with their parameters and results."""
     names = [*x.parameters, *x.results]
-    rows = tuple(
-        b.TableRow(
-            (exact(point["point"]), *(number(point[name], x.digits(name)) for name in names)),
-            form="both" if k < 5 else "long",
-        )
-        for k, point in enumerate(x.best)
-    )
+    rows = []
+    for k, point in enumerate(x.best):
+        numbers = (number(point[name], x.digits(name)) for name in names)
+        rows.append(b.TableRow((exact(point["point"]), *numbers), form="both" if k < 5 else "long"))
     if rows:
         first = 1 + len(x.parameters)
         groups = (tuple(range(1, first)), tuple(range(first, 1 + len(names))))
         title = filled("Points with the {} first", x.best_by)
-        yield b.Table(rows, (b.Column("point"), *_columns(names)), title=title, groups=groups)
+        yield b.Table(tuple(rows), (b.Column("point"), *_columns(names)), title=title, groups=groups)
 
 
 def _extremes(x: SweepSummary) -> Iterator[b.Block]:
-    rows = tuple(
-        b.TableRow(
-            (
-                line(Name(name), f", {end}"),
-                *(number(point[column], x.digits(column)) for column in (name, *x.parameters)),
-            )
-        )
-        for name, ends in x.extremes.items()
-        for end, point in ends.items()
-    )
+    """The points with the least and with the largest value of each result."""
+    rows = []
+    for name, ends in x.extremes.items():
+        for end, point in ends.items():
+            numbers = (number(point[column], x.digits(column)) for column in (name, *x.parameters))
+            rows.append(b.TableRow((line(Name(name), f", {end}"), *numbers)))
     if rows:
         heads = (b.Column("result"), b.Column("value"), *_columns(x.parameters))
-        yield b.Table(rows, heads, title="Least and largest values, and the points at which they stand")
+        yield b.Table(
+            tuple(rows), heads, title="Least and largest values, and the points at which they stand"
+        )
 
 
 def _influences(x: SweepSummary) -> Iterator[b.Block]:
+    """The influence of each parameter on each result: rank correlation, and shares of the variance if they are
+    known."""
     if not x.influences or len(x.parameters) < 2:
         return
     for name, row in x.influences.items():
-        shares = {
-            parameter: number(influence.share.value)
-            for parameter, influence in row.items()
-            if influence.share
-        }
+        shares = {key: number(influence.share.value) for key, influence in row.items() if influence.share}
         if len(shares) == len(row):
             most = max(shares, key=lambda parameter: shares[parameter].value or 0.0)
             sentence = "{}: {} moves it most; alone it explains {} of the variance."
@@ -192,39 +188,28 @@ def _influence_table(
 ) -> b.Table:
     """A table with a column for each result, and for each parameter a row for each kind of cell; `cells` has them by
     the words behind the name of the parameter."""
-    rows = (
-        b.TableRow(
-            (
-                line(Name(parameter), kind) if kind else Name(parameter),
-                *(cell(row[parameter]) if parameter in row else "-" for row in x.influences.values()),
-            )
-        )
-        for parameter in x.parameters
-        for kind, cell in cells.items()
-    )
+    rows = []
+    for parameter in x.parameters:
+        for kind, cell in cells.items():
+            title = line(Name(parameter), kind) if kind else Name(parameter)
+            values = (cell(row[parameter]) if parameter in row else "-" for row in x.influences.values())
+            rows.append(b.TableRow((title, *values)))
     return b.Table(tuple(rows), (b.Column("parameter"), *_columns(x.influences)), **more)
 
 
 def _spread(x: SweepSummary) -> Iterator[b.Block]:
+    """Mean, deviation and quantiles of each result of a sweep with tolerances."""
     spread = x.spread.spread
     if not spread:
         return
     keys = list(dict.fromkeys(key for numbers in spread.values() for key in numbers.quantiles))
-    rows = (
-        b.TableRow(
-            (
-                Name(name),
-                number(x.nominal[name], x.digits(name)) if name in x.nominal else "-",
-                number(numbers.mean, x.digits(name)),
-                number(numbers.deviation),
-                *(
-                    number(numbers.quantiles[key].value, x.digits(name)) if key in numbers.quantiles else "-"
-                    for key in keys
-                ),
-            )
-        )
-        for name, numbers in spread.items()
-    )
+    rows = []
+    for name, numbers in spread.items():
+        digits, quantiles = x.digits(name), numbers.quantiles
+        nominal = number(x.nominal[name], digits) if name in x.nominal else "-"
+        cells = (number(quantiles[key].value, digits) if key in quantiles else "-" for key in keys)
+        mean, deviation = number(numbers.mean, digits), number(numbers.deviation)
+        rows.append(b.TableRow((Name(name), nominal, mean, deviation, *cells)))
     columns = (
         b.Column("result"),
         b.Column("at the study's values", "study"),
@@ -252,6 +237,7 @@ def _spread(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _basis(x: SweepSummary, driver: str) -> Iterator[b.Block]:
+    """The swept parameters, the results, and the assumptions behind them."""
     yield from table(
         x.parameters.items(),
         ("parameter", lambda row: Name(row[0])),

@@ -132,6 +132,7 @@ def _sobol(seed: int, size: int) -> Callable[[int, int], Any]:
     lock = threading.Lock()
 
     def part(begin: int, end: int) -> Any:
+        """The points from `begin` to `end` - 1; the sequence goes on from the last one, or starts anew."""
         with lock:
             if begin == 0 or sequence.num_generated > begin:
                 sequence.reset()

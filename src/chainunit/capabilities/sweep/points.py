@@ -206,8 +206,8 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     table = task.turns(values)
     reason = task.codes_of_turns(table)
     for parameter in plan.parameters:
-        inside = parameter.variable.quantity.admits(values[parameter.name])
-        reason[~inside] = task.codes[ReasonKind.BOUNDS, parameter.name]
+        admitted = parameter.variable.quantity.admits(values[parameter.name])
+        reason[~admitted] = task.codes[ReasonKind.BOUNDS, parameter.name]
     results = {plain_name(name): x for name, x in values.items()}
     for name in plan.quantities:
         results[plain_name(name)] = np.where(

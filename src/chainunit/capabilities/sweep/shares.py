@@ -52,9 +52,9 @@ def shares_on_grid(y: Any) -> list[Shares]:
     whole, axes = float(np.var(y)), range(y.ndim)
     exact = []
     for i in axes:
-        alone = float(np.var(np.mean(y, axis=tuple(k for k in axes if k != i)))) / whole
+        by_itself = float(np.var(np.mean(y, axis=tuple(k for k in axes if k != i)))) / whole
         in_all = float(np.mean(np.var(y, axis=i))) / whole
-        exact.append(Shares(_share(alone, alone, alone), _share(in_all, in_all, in_all)))
+        exact.append(Shares(_share(by_itself, by_itself, by_itself), _share(in_all, in_all, in_all)))
     return exact
 
 
@@ -84,21 +84,22 @@ def shares_of_points(parameters: Sequence[SweptParameter], x: Any, y: Any) -> li
 
 
 def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
-    """The share of the terms `some` in the variance. They may have the share `most` of the rest too much or too
-    little, and the terms beside them all of it."""
+    """The share of the terms `some` in the variance, with its interval. The variance that the polynomials leave
+    unexplained may be due to these terms up to its share `most`, and all of it to the others; and the share scatters
+    with the points."""
     c, e = fit.coefficients, fit.errors
-    part, whole, rest = float(np.sum(c[some] ** 2)), float(np.sum(c[1:] ** 2)), float(np.mean(e**2))
+    part, whole, unexplained = float(np.sum(c[some] ** 2)), float(np.sum(c[1:] ** 2)), float(np.mean(e**2))
     if not whole > 0.0:
         return _share(0.0, 0.0, 1.0)
     share = part / whole
     contribution = phi[:, some] @ c[some]
     others = phi[:, 1:] @ c[1:] - contribution
-    error = (
-        2.0 * float(np.std(((1.0 - share) * contribution - share * others) * e)) / math.sqrt(len(e)) / whole
-    )
-    least, highest, beside = max(0.0, part - most * rest), part + most * rest, whole - part
-    low = least / (least + beside + rest) - _SIGMAS * error - _ROUNDING
-    high = highest / (highest + max(0.0, beside - rest)) + _SIGMAS * error + _ROUNDING
+    scatter = float(np.std(((1.0 - share) * contribution - share * others) * e))
+    error = 2.0 * scatter / math.sqrt(len(e)) / whole
+    least, highest = max(0.0, part - most * unexplained), part + most * unexplained
+    beside = whole - part
+    low = least / (least + beside + unexplained) - _SIGMAS * error - _ROUNDING
+    high = highest / (highest + max(0.0, beside - unexplained)) + _SIGMAS * error + _ROUNDING
     return _share(share, max(0.0, low), min(1.0, high))
 
 
@@ -152,19 +153,17 @@ def _polynomials(parameters: Sequence[SweptParameter], x: Any, terms: Any) -> An
 
 
 def _of_one(parameter: SweptParameter, x: Any, degree: int) -> Any:
-    """Polynomials up to the degree that are orthonormal for the distribution of a parameter, shape (points,
-    degree + 1)."""
+    """Polynomials up to the degree that are orthonormal for the distribution of a parameter, at its values `x`, shape
+    (points, degree + 1): of Hermite for a normal one, of Legendre for an even one, and by QR for single values."""
     from numpy.polynomial import hermite_e, legendre
 
     if parameter.is_normal:
         t = (x - parameter.centre) / parameter.deviation
         return hermite_e.hermevander(t, degree) / np.sqrt([math.factorial(k) for k in range(degree + 1)])
     low, high = parameter.ends
-    polynomials = legendre.legvander((2.0 * x - low - high) / (high - low), degree) * np.sqrt(
-        2.0 * np.arange(degree + 1) + 1.0
-    )
     if not parameter.values:
-        return polynomials
+        sizes = np.sqrt(2.0 * np.arange(degree + 1) + 1.0)
+        return legendre.legvander((2.0 * x - low - high) / (high - low), degree) * sizes
     values = np.array(parameter.values)
     matrix = legendre.legvander((2.0 * values - low - high) / (high - low), degree)
     q, _ = np.linalg.qr(matrix)
@@ -188,9 +187,10 @@ def _fitted(phi: Any, y: Any) -> _Polynomial:
     grams, moments = [p.T @ p for p, _ in parts], [p.T @ v for p, v in parts]
     gram, moment = sum(grams), sum(moments)
     most = min(phi.shape[1], len(y) // 3, _CHOSEN)
-    paths = [
-        _path(gram - g, moment - m, *part, most) for g, m, part in zip(grams, moments, parts, strict=True)
-    ]
+    # each part is judged by the fits, of 1, 2, .. terms, to all other parts
+    paths = []
+    for k, (p, v) in enumerate(parts):
+        paths.append(_path(gram - grams[k], moment - moments[k], p, v, most))
     best = int(np.argmin(np.sum([np.sum(path.errors**2, axis=0) for path in paths], axis=0)))
     errors = np.empty(len(y))
     for k, path in enumerate(paths):

@@ -169,15 +169,17 @@ class SweepSummary:
     store: PointStore = part(inline=True)
 
     def digits(self, name: str) -> int:
-        """The number of digits with which a hundredth of the range of a parameter or result shows."""
-        low, high = 0.0, 1.0
+        """The number of significant digits, 4 to 12, with which a hundredth of the range of a parameter or result
+        shows: one more than the powers of ten between that hundredth and the largest value."""
+        low, high = 0.0, 0.0
         if name in self.extremes:
             low, high = (self.extremes[name][end][name].value for end in ("least", "largest"))
         elif name in self.parameters:
             low, high = self.parameters[name].low, self.parameters[name].high
         if not high > low:
             return 4
-        return min(12, max(4, 3 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low)))))
+        largest = max(abs(low), abs(high))
+        return min(12, max(4, 3 + math.ceil(math.log10(largest / (high - low)))))
 
 
 @briefly_shown
@@ -284,6 +286,7 @@ def _ends(findings: SweepFindings) -> _Ends:
 
 
 def _range(parameter: SweptParameter, is_grid: bool) -> SweptRange:
+    """The range of a parameter, for the result."""
     v, (low, high) = parameter.variable, parameter.ends
     return SweptRange(
         description=v.description,
@@ -336,8 +339,8 @@ def _nominal(findings: SweepFindings) -> dict[str, float]:
 
 
 def _organs(findings: SweepFindings) -> list[OrganShare]:
-    """The limits of the crank speed for two bars as organs, of the study's machine and feed; only limits that a point
-    passes, and none where no result depends on the organs."""
+    """The limits of the crank speed for two bars as organs, each with the number and the share of the points that
+    pass it; only limits that a point passes, and none where no result depends on the organs."""
     config, plan, task = findings.config, findings.plan, findings.task
     if config.machine.in_place:
         return []
@@ -349,6 +352,7 @@ def _organs(findings: SweepFindings) -> list[OrganShare]:
         for _, points in findings.parts([SPEED]):
             counts += [np.count_nonzero(limit.passed(points[SPEED].values)) for limit in limits]
     else:
+        # all points have the crank speed of the study
         limits = tuple(passed_limits(limits, task.crank_speed))
         counts = np.full(len(limits), plan.points)
     return [
@@ -359,6 +363,7 @@ def _organs(findings: SweepFindings) -> list[OrganShare]:
 
 
 def _spread(findings: SweepFindings, sample: Mapping[str, Any]) -> Iterator[tuple[str, ResultSpread]]:
+    """Mean, deviation and quantiles of each result that has finite values."""
     for name in findings.results:
         x, v = sample[name][np.isfinite(sample[name])], findings.variables[name]
         if len(x):

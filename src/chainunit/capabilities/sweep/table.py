@@ -271,10 +271,8 @@ def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -
         return SweptParameter(variable, centre, values)
     wide, usual = None, _VALUES
     if way == "tolerance":
-        wide, usual = (
-            entry.quantity("tolerance", _tolerance_of(variable), content["tolerance"]),
-            _VALUES_OF_TOLERANCE,
-        )
+        wide = entry.quantity("tolerance", _tolerance_of(variable), content["tolerance"])
+        usual = _VALUES_OF_TOLERANCE
         low, high = centre - wide, centre + wide
     else:
         low, high = (_end(entry, name, variable) for name in ("from", "to"))

@@ -208,6 +208,7 @@ class Resonance:
         return self._ranges((self.motion.free_growth > DRIFT) & ~self.motion.unstable)
 
     def _ranges(self, inside: Any) -> list[tuple[float, float]]:
+        """The ranges of the speed at which `inside` is true, their ends halfway to the next speeds."""
         speed = self.speed
         middle = np.concatenate([speed[:1], 0.5 * (speed[1:] + speed[:-1]), speed[-1:]])
         return [(float(middle[a]), float(middle[b])) for a, b in stretches(inside)]
@@ -309,6 +310,7 @@ class TorsionFindings(Findings):
                 yield _ORDER.remark(n=f"{n}", speed=speed, **numbers, amplitude=self.excitation[n])
 
     def _in_normal_running(self) -> Iterator[Remark]:
+        """Remarks on large peaks, on a torque that changes its sign, and on instability in normal running."""
         motion, static2 = self.operating.motion, self.operating.static_torque2
         speed, load, factor = self.rotation.speed, self.rotation.load, self.ranges.factor
         for shaft, peak, static in (("2", motion.peak2[0], static2), ("3", motion.peak3[0], load)):

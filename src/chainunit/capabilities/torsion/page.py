@@ -109,6 +109,7 @@ def _running(analysis: TorsionFindings) -> fig.Mark:
 
 
 def _campbell(analysis: TorsionFindings) -> fig.Figure:
+    """Orders of the ratio i23 and the damped natural frequency over the speed."""
     curve, motion, axis = analysis.resonance, analysis.resonance.motion, _speed_axis(analysis)
     slowest, fastest = _speed_ends(analysis)
     low, high = analysis.natural_frequency.over_both_turns
@@ -141,6 +142,7 @@ def _campbell(analysis: TorsionFindings) -> fig.Figure:
 
 
 def _stability(analysis: TorsionFindings) -> fig.Figure:
+    """A map of the growth of a disturbance over speed and bend, for each damping ratio."""
     grid, k = analysis.map, analysis.natural_frequency.even
     levels = -1.0, 0.0, 0.01, 0.03, 10.0
     names = "stable", "grows below 0.01 k", "0.01 to 0.03 k", "faster"
@@ -172,11 +174,10 @@ def _stability(analysis: TorsionFindings) -> fig.Figure:
 
 
 def _resonance(analysis: TorsionFindings) -> fig.Figure:
+    """The peak torque of each shaft over the speed: elastic, rigid, and by simulation in time."""
     curve, simulation, panels = analysis.resonance, analysis.simulation, []
     for shaft, static in ((2, analysis.operating.static_torque2), (3, analysis.rotation.load)):
-        steady, rigid = (
-            np.asarray(getattr(motion, f"peak{shaft}")) for motion in (curve.motion, curve.rigid)
-        )
+        steady, rigid = (np.asarray(getattr(x, f"peak{shaft}")) for x in (curve.motion, curve.rigid))
         items: list[fig.Item] = [
             fig.Curve("steady motion", curve.speed, steady),
             fig.Curve("rigid shafts", curve.speed, rigid, 2),
@@ -210,6 +211,7 @@ def _resonance(analysis: TorsionFindings) -> fig.Figure:
 
 
 def _ratio(analysis: TorsionFindings) -> fig.Figure:
+    """The ratio of the joints and the natural frequency over a turn of the shaft."""
     turn = fig.Axis(
         "angle of shaft 2 from the plane of the joint", "rad", low=0.0, high=2.0 * np.pi, step=45.0
     )

@@ -71,16 +71,16 @@ def certified(
         evidence, sentences = _evidence(members, name, model)
         data = json.dumps(evidence, indent=1, sort_keys=True, allow_nan=False).encode() + b"\n"
         return signed({**members, EVIDENCE: data, RELATED: _related(members)}, key), sentences
-    sentences, inside = [], {}
+    sentences, certified_members = [], {}
     for member in archives_in(members):
         place = printable(member)
         content = contents(members[member], f"{name}: {place}")
         if not is_of_this_version(content):
             sentences.append(f"{place}: is not of this version of chainunit, and not judged")
             continue
-        inside[member], lines = certified(content, f"{name}: {place}", key, None)
+        certified_members[member], lines = certified(content, f"{name}: {place}", key, None)
         sentences += [f"{place}: {line}" for line in lines]
-    return signed({**members, **inside}, key), sentences
+    return signed({**members, **certified_members}, key), sentences
 
 
 def _related(members: Mapping[str, bytes]) -> bytes:
@@ -152,8 +152,8 @@ def interface_in(fmu: UnpackedFmu, model: Model | None = None) -> Interface | No
 
 def _is_in(fmu: UnpackedFmu, signal: Signal) -> bool:
     """Whether an FMU has a variable with its unit and its nominal size, over which deviations are told."""
-    there, variable = fmu.variables.get(signal.name), signal.variable
-    if there is None or TYPES[there.type] != variable.type:
+    in_fmu, variable = fmu.variables.get(signal.name), signal.variable
+    if in_fmu is None or TYPES[in_fmu.type] != variable.type:
         return False
-    numbers = (str(there.unit or ""), there.nominal)
+    numbers = (str(in_fmu.unit or ""), in_fmu.nominal)
     return variable.type != "Real" or numbers == (variable.unit, variable.quantity.nominal or 1.0)

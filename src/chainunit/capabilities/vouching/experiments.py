@@ -117,6 +117,7 @@ def deviation(table: TimeTable, wanted: TimeTable, fmu: UnpackedFmu) -> Deviatio
 
 
 def _largest(gaps: Mapping[str, float], sizes: Mapping[str, float]) -> Deviation:
+    """The largest gap over the size of its variable; infinite for one that is no number."""
     shares = {name: float(gap / sizes[name]) for name, gap in gaps.items()}
     deviations = (Deviation(x if math.isfinite(x) else math.inf, name) for name, x in shares.items())
     return max(deviations, default=Deviation(0.0, ""))
@@ -169,13 +170,14 @@ def chosen_points(interface: Interface) -> list[StatePoint]:
     start = {s.name: float(s.start or 0.0) for s in parameters}
     quantities = {s.name: s.variable.quantity for s in interface.signals}
     real = [s.name for s in parameters if s.variable.type == "Real" and s.start and "solver." not in s.name]
+    # parameters such as motor.phi_start that are 0
+    motion_starts = {name: name.rpartition(".")[2] for name, x in start.items() if x == 0.0}
     points = []
     for k in range(POINTS):
         inputs = {name: float(x) for name, x in course(0.08 * k).items()}
         inputs |= _turned_shafts(interface, inputs, gear, k)
         motion = {"phi_start": gear * _ANGLE * k, "w_start": gear * 0.2 * k}
-        last_words = {name: name.rpartition(".")[2] for name, x in start.items() if x == 0.0}
-        moved = {name: motion[word] for name, word in last_words.items() if word in motion}
+        moved = {name: motion[last] for name, last in motion_starts.items() if last in motion}
         shifts = {name: 2.0 * rng.random() - 1.0 for name in real}
         for spread in (*SPREADS, 0.0) if k else (0.0,):
             values = start | moved | {name: start[name] * (1.0 + spread * x) for name, x in shifts.items()}
@@ -195,17 +197,16 @@ def _gear(interface: Interface) -> float:
 def _turned_shafts(
     interface: Interface, inputs: Mapping[str, float], gear: float, k: int
 ) -> dict[str, float]:
-    """Angle, speed and acceleration of each shaft among the `inputs` of the point `k` whose angle has no bounds: the
-    crank after the gear stands at an angle of its own, and has the speed of the course."""
+    """Angle, speed and acceleration of each shaft among the `inputs` of the point `k`, for shafts whose angle has no
+    bounds. The inputs count as those of the crank: the shaft turns `gear` times as far and as fast, and each point is
+    turned on by `_ANGLE` of the crank."""
     quantities = {s.name: s.variable.quantity for s in interface.signals_of("input")}
     turned = dict[str, float]()
     for terminal in interface.model.terminals:
-        names = [terminal.members.get(key) for key in ("phi", "w", "a")]
-        if set(names) <= set(inputs) and names[0]:
-            angle = quantities[names[0]]
-            if not math.isfinite(angle.high - angle.low):
-                turned |= {name: gear * inputs[name] for name in names if name}
-                turned[names[0]] = gear * (inputs[names[0]] + _ANGLE * k)
+        phi, w, a = (terminal.members.get(key, "") for key in ("phi", "w", "a"))
+        if {phi, w, a} <= inputs.keys() and not math.isfinite(quantities[phi].high - quantities[phi].low):
+            turned[phi] = gear * (inputs[phi] + _ANGLE * k)
+            turned |= {name: gear * inputs[name] for name in (w, a)}
     return turned
 
 

@@ -96,7 +96,7 @@ def conclusion(findings: Sequence[Finding]) -> tuple[int, str]:
     holds."""
     if failed := sum(finding.holds is False for finding in findings):
         return FAILS, f"does not hold: {failed} of {len(findings)} lines fail"
-    if not (left := list(dict.fromkeys(finding.open for finding in findings if finding.open))):
+    if not (open_points := list(dict.fromkeys(finding.open for finding in findings if finding.open))):
         return HOLDS, "holds"
     unnamed = next((f.open for f in findings if f.topic == "signature" and f.open), None)
-    return OPEN, f"intact, {unnamed}" if unnamed else f"holds, but {' and '.join(left)}"
+    return OPEN, f"intact, {unnamed}" if unnamed else f"holds, but {' and '.join(open_points)}"

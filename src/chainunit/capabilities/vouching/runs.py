@@ -122,6 +122,7 @@ def unpacked(members: Mapping[str, bytes], name: str) -> Iterator[UnpackedFmu]:
 
 
 def _number(text: Any) -> float | None:
+    """A start value of an FMU as a number; None if it is none."""
     try:
         return None if text is None else float(_SWITCH.get(text, text))
     except ValueError:

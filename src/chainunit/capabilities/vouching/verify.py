@@ -107,8 +107,8 @@ def _judge_fmu(
         try:
             experiments = ex.by_equations(interface)
         except ModuleNotFoundError as error:
-            left = f"its experiments were not computed again without the package {error.name}"
-            check.add(None, "equations", left, left)
+            sentence = f"its experiments were not computed again without the package {error.name}"
+            check.add(None, "equations", sentence, sentence)
         else:
             gap = ex.table_gap(tables, experiments.reference, fmu)
             check.add(gap.value <= limit, "equations", f"the equations in Python here: {gap.sentence(limit)}")

@@ -36,24 +36,24 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _who_notices(runs: StudyRuns, x: ObserverFindings) -> b.Table:
+    """When observer, current and coupling notice each overload, and the side that the observer names."""
     names = by_side(runs, x.notices)
 
     def rows() -> Iterator[b.TableRow]:
+        """Two rows for each device, and one with the side that the observer names."""
         for device, title in DEVICES.items():
             if device in x.notices[names[0]]:
                 notices = [x.notices[run][device] for run in names]
                 times = (number(notice.time, none="not") for notice in notices)
                 yield b.TableRow((f"{title}, after", *times))
                 yield b.TableRow(("rocker torque by then", *(number(notice.carried) for notice in notices)))
-        sides = (_named(x.named[run], x.loaded[run]) for run in names)
+        sides = []
+        for run in names:
+            side, loaded = x.named[run], x.loaded[run]
+            sides.append(f"{side} (wrong)" if side and loaded not in ("", side) else side or "none")
         yield b.TableRow(("side that the observer names", *sides))
 
     return over_runs(runs, names, rows(), "Who notices")
-
-
-def _named(named: str, loaded: str) -> str:
-    """The side that the observer names, and whether it is the loaded one."""
-    return f"{named} (wrong)" if named and loaded not in ("", named) else named or "none"
 
 
 _MASS = fig.Axis("feed of a side", "kg")
@@ -63,18 +63,15 @@ _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study.findings).notices, "observer.png")
 def _print(study: StudyRecord) -> fig.Figure:
-    """All events beside each other, for print."""
-    events = [_event(study, name) for name in ObserverFindings.of_study(study.findings).notices]
-    rows = zip(*(figure.panels for figure in events), strict=True)
-    panels = (
-        tuple(
-            panel and replace(panel, title="" if k else figure.title)
-            for figure, (panel,) in zip(events, row, strict=True)
-        )
-        for k, row in enumerate(rows)
-    )
+    """All events beside each other, for print: a column for each, with its title above."""
+    columns = []
+    for name in ObserverFindings.of_study(study.findings).notices:
+        figure = _event(study, name)
+        (first, *others) = (panel for (panel,) in figure.panels)
+        columns.append([first and replace(first, title=figure.title), *others])
     title = "The load observer in every event"
-    return fig.Figure("observers", title, f"{title}: loads and imbalances.", tuple(panels), on_page=False)
+    panels = tuple(zip(*columns, strict=True))
+    return fig.Figure("observers", title, f"{title}: loads and imbalances.", panels, on_page=False)
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study.findings).notices)
@@ -89,11 +86,13 @@ def _event(study: StudyRecord, name: str) -> fig.Figure:
     low = max(float(time[0]), -0.5 * math.pi / study.setup.config.run.crank_speed)
 
     def loads(load: str) -> Iterator[fig.Item]:
+        """The estimates of a load of both sides, and the true values."""
         for look, side in enumerate(SIDES):
             yield fig.Curve(f"{side}, estimated", time, run[f"observer.{side}.{load}"].values, look)
             yield fig.Curve("true", time, run[f"machine.{side}.{load}"].values, "path", in_legend=not look)
 
     def shares() -> Iterator[fig.Item]:
+        """The imbalances of feed and force in parts of their thresholds."""
         for look, ground in enumerate(("feed", "force")):
             yield fig.Curve(f"of the {ground}", time, run[f"observer.grounds.{ground}"].values, look + 2)
         yield from (fig.Mark(threshold, axis="y", look="limit") for threshold in (-1.0, 1.0))

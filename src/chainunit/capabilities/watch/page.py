@@ -67,6 +67,7 @@ TASK: Task[Config, WatchSummary] = Task(
 
 
 def _opening(x: WatchSummary) -> Iterator[b.Block]:
+    """The answer: the alarms, or that there is none, after all that makes them doubtful."""
     yield from _cautions(x)
     if not x.alarms:
         turns, duration = number(x.recording.turns, 3), number(x.recording.duration, 3)
@@ -149,6 +150,7 @@ def _limits(x: WatchSummary) -> Iterator[b.Block]:
 
 
 def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
+    """The usual estimates, and the figures of estimates and thresholds over time."""
     usual = [(quantity, x.usual[name]) for name, quantity in _USUAL.items() if name in x.usual]
     yield from table(
         usual,
@@ -215,6 +217,7 @@ def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
 
 
 def _alarms(x: WatchSummary) -> Iterator[b.Block]:
+    """A row for each alarm, with the outputs of the observer where the imbalance is largest."""
     if not x.alarms:
         yield b.Text("There is none.")
 
@@ -238,6 +241,7 @@ def _alarms(x: WatchSummary) -> Iterator[b.Block]:
 
 
 def _basis(x: WatchSummary) -> Iterator[b.Block]:
+    """The numbers that were learned at the begin, and the tuning of the observer."""
     learned = (
         "Angle, zero and loads were learned in the first {}. Alarms of one side with less than two turns between "
         "them are one."

@@ -165,9 +165,9 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
 def _course(watched: WatchedRecording) -> dict[str, InUnit]:
     """Time and outputs at evenly spaced rows, at most `ROWS`."""
     time, declared = watched.recording.time, declared_outputs()
-    every = slice(None, None, max(1, math.ceil(len(time) / ROWS)))
-    outputs = {name: InUnit(watched.outputs[name][every], declared[name].unit) for name in OUTPUTS}
-    return {"time": InUnit(time[every], "s"), **outputs}
+    thinned = slice(None, None, max(1, math.ceil(len(time) / ROWS)))
+    outputs = {name: InUnit(watched.outputs[name][thinned], declared[name].unit) for name in OUTPUTS}
+    return {"time": InUnit(time[thinned], "s"), **outputs}
 
 
 def _file_name(name: str) -> str:

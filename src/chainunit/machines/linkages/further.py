@@ -151,10 +151,8 @@ class FurtherDrivers:
         """The outputs of all drivers in a state of the linkage, at the acceleration `a` of the first one."""
         if not self.entries:
             return {}
-        driven, values = (
-            s.driven if isinstance(s, StateOfDrivers) else driven_from(xp, s.m, s.m.q, s.w, {}),
-            {},
-        )
+        driven = s.driven if isinstance(s, StateOfDrivers) else driven_from(xp, s.m, s.m.q, s.w, {})
+        values = {}
         efforts, accelerations = driven.efforts(a), driven.accelerations(a)
         for k, entry in enumerate(self.entries, 1):
             motion = driven.motions[k]

@@ -139,8 +139,7 @@ class Mesh(Placed):
 class GearedLink(Group):
     """A wheel on a pin that moves in a known way, in mesh with another wheel: its bar, the pitch point, the wheel
     `by`, the pin at its centre, and how the wheel turns. It has the angle `angle` [rad] at the place `start` of the
-    driver. Its margin is 1 or, if its ratio is no whole number, 0 if its source has turned by nearly half a
-    turn."""
+    driver. Its margin is 1 or, if its ratio is no whole number, 0 if its source has turned by nearly half a turn."""
 
     bar: Bar
     mesh: str
@@ -496,10 +495,8 @@ def _pitch(joint: JointEntry, geometry: Any) -> tuple[Vec2, Any]:
     """The direction of the pitch line of a rack, and how far it lies to the left of the centre of the pinion [m]."""
     rack, point = joint.on
     guide = geometry.structure.joints[joint.table["guide"]]
-    d, place = (
-        geometry.direction(guide, GROUND),
-        geometry.line_through(guide, rack, geometry.point(rack, point)),
-    )
+    d = geometry.direction(guide, GROUND)
+    place = geometry.line_through(guide, rack, geometry.point(rack, point))
     return d, d.cross(place - geometry.point(GROUND, joint.table["centre"]))
 
 

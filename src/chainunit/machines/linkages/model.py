@@ -284,10 +284,8 @@ class LinkageDescription(LinkageOutputs):
                 for joint in self.data["joints"]
                 if "length" in joint
             }
-            usual, of_cams = (
-                getattr(p, "guides", None) or p.cams,
-                dict.fromkeys(cams, getattr(p, "cams", None)),
-            )
+            usual = getattr(p, "guides", None) or p.cams
+            of_cams = dict.fromkeys(cams, getattr(p, "cams", None))
             differing = of_cams | laws.get("cams", {}) | laws.get("guides", {})
             loads["guides"] = GuideLosses(usual, usual.damping, lengths, differing)
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)

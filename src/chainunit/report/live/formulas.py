@@ -44,6 +44,8 @@ def data_of(value: Any) -> Data:
 
 
 def _operator(name: str, sign: str) -> None:
+    """Give formulas the operator of a `sign`, with numbers on either side."""
+
     def forward(self: Formula, other: Any) -> Formula:
         return Formula([sign, self.data, data_of(other)])
 

@@ -62,13 +62,7 @@ def of_study(
         chosen.append(speed_of_crank(float(speed)))
     chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, model_names)]
     if runs:
-        chosen += runs.quantities
-        J = variable_of(FlywheelTable, "J")
-        part = drive.geared_line.part("flywheel")
-        role, placed = ("added", ()) if drive.flywheel_shaft.is_motor else ("", ("flywheel.J_wheel",))
-        # on a driven pulley it is a part of the inertia of the pulley
-        if part is not None or drive.flywheel_shaft.is_motor:
-            chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", (), placed, role))
+        chosen += [*runs.quantities, *_flywheel(drive)]
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent
     copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)
@@ -85,6 +79,16 @@ def without_drive(config: Config, why: str) -> LiveMachine:
     turn = live_turn(machine, speed, config.units)
     copied = changed_tables(config, _lengths(machine), _TITLE, Path(config.file.source).parent)
     return assembled(turn, None, why, chosen, _without_dates(copied), config.units)
+
+
+def _flywheel(drive: Drive) -> Iterable[LiveQuantity]:
+    """The inertia of the flywheel, on the motor's shaft or as a part of the line. On a driven pulley it is a part of
+    the inertia of the pulley, and no quantity of its own."""
+    key, J = ("flywheel", "J"), variable_of(FlywheelTable, "J")
+    if drive.flywheel_shaft.is_motor:
+        yield LiveQuantity(key, J, drive.added_inertia, "drive", role="added")
+    elif drive.geared_line.part("flywheel") is not None:
+        yield LiveQuantity(key, J, drive.added_inertia, "drive", runs=("flywheel.J_wheel",))
 
 
 def _ratio(drive: Drive, is_plate: bool) -> Iterable[LiveQuantity]:

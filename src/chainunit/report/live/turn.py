@@ -45,13 +45,14 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     model_columns = trace(model).columns
     results = list(_results(machine, forces, model_columns, units))
     shown = [pin for pin in places(whole) if f"x({pin})" in model_columns]
-    lines = [name for name in model_columns if name.startswith("line(")]
+    # by block, the column with the angle of its line
+    lines = {name[5:-1]: name for name in model_columns if name.startswith("line(")}
     columns = dict.fromkeys(
         [
             *(result["of"] for result in results),
             *(f"{force['of']}.{axis}" for force in forces for axis in ("fx", "fy")),
             *(f"{axis}({pin})" for pin in shown for axis in "xy"),
-            *lines,
+            *lines.values(),
             *(name for pull in _pulls(model_columns) for name in pull["columns"]),
         ]
     )
@@ -77,7 +78,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
             "outlines": picture.outlines,
             "names": picture.names,
             "joints": shown,
-            "blocks": {name[5:-1]: name for name in lines if name[5:-1] in (*shown, *picture.outlines)},
+            "blocks": {block: name for block, name in lines.items() if block in (*shown, *picture.outlines)},
             "paths": {title: title.removeprefix("path of ") for title in picture.paths},
             "rails": list(picture.rails),
         },

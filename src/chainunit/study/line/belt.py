@@ -71,12 +71,12 @@ class BeltPlan(SlipPlan):
             speed = table.rated_speed * max(1.0, 1.0 / ratio)
             belt = belt_drive(table.rated_power, speed, step, table.service_factor)
             table = replace(table, diameter=belt.small if ratio >= 1.0 else belt.small / ratio)
-        both = table.diameter * (1.0 + ratio)
-        table = self.filled(table, distance=both)
-        if not table.distance > 0.5 * both:
+        sum_d = table.diameter * (1.0 + ratio)
+        table = self.filled(table, distance=sum_d)
+        if not table.distance > 0.5 * sum_d:
             raise InputError(
-                f"belt.distance = {1e3 * table.distance:.4g} mm: must be > {500.0 * both:.4g} mm, half of both "
-                f"pulleys; leave it out for {1e3 * both:.4g} mm",
+                f"belt.distance = {1e3 * table.distance:.4g} mm: must be > {500.0 * sum_d:.4g} mm, half of both "
+                f"pulleys; leave it out for {1e3 * sum_d:.4g} mm",
                 key="belt.distance",
             )
         return self.filled(

@@ -189,14 +189,14 @@ def _on_rigid_line(study: StudyRecord, rigid_line: RigidLine) -> None:
     """Warn of a line that swings too slowly for a rigid model of the drive."""
     if rigid_line.holds:
         return
-    taken = ["the turn at constant speed"]
-    taken += ["the speed loop"] if study.setup.statics.loops else []
-    taken += ["the choice of the drive"] if study.setup.proposal is not None else []
+    results = ["the turn at constant speed"]
+    results += ["the speed loop"] if study.setup.statics.loops else []
+    results += ["the choice of the drive"] if study.setup.proposal is not None else []
     study.findings.say(
         _NOT_RIGID,
         natural_frequency=rigid_line.natural_frequency,
         driver_frequency=rigid_line.driver_frequency,
         ratio=rigid_line.ratio,
         least=f"{HOLDS_FROM:g}",
-        taken=" and ".join(filter(None, (", ".join(taken[:-1]), taken[-1]))),
+        taken=" and ".join(filter(None, (", ".join(results[:-1]), results[-1]))),
     )
