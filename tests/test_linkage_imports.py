@@ -200,6 +200,14 @@ def test_crank_rocker_with_a_force():
     assert model.by_name["CD.mass"] == 4.0
 
 
+def test_an_upright_force_has_no_share_across():
+    """A share of 1e-15 N would be warned of as unusual."""
+    text = FORCE.replace("0.8,0.9,0.5,0.9,t,true,-0.0,250", "0.8,0.9,0.8,0.2,t,true,0,250")
+    across, upward = imported(text).tables["loads"]["F1"]["force"]
+    assert across == 0.0 and upward == pytest.approx(-250.0, rel=1e-15)
+    assert not imported(text).machine()[1]
+
+
 def test_a_slider_that_keeps_its_angle():
     """A P joint of Pyslvs is a guide without a block."""
     text = (

@@ -107,9 +107,9 @@ class PmksDrawing(ForeignLinkage):
         if row[1] not in self.names:
             self.fault(title, f"is on {shown(row[1])}, which is no link of the address")
             return
-        size, angle = math.hypot(*sizes), math.atan2(end_y - y, end_x - x)
-        size = -size if row[7] in _FALSE else size
+        way = complex(end_x - x, end_y - y) or 1.0 + 0.0j
+        way *= (-1.0 if row[7] in _FALSE else 1.0) * math.hypot(*sizes) / abs(way)
         point = self.pin(row[0], (x, y), self.names[row[1]])
         kind = "follower" if row[6] in _FALSE else "force"
-        load = {"type": kind, "force": [size * math.cos(angle), size * math.sin(angle)]}
+        load = {"type": kind, "force": [way.real, way.imag]}
         self.loads[point] = self.names[row[1]], load
