@@ -15,6 +15,7 @@ import xarray as xr
 from command import chainunit
 from records import like
 from scipy.optimize import brentq
+from sizings import duty_by, trials_of
 
 from chainunit import InputError
 from chainunit.capabilities.checks.coupling import inertias
@@ -26,6 +27,7 @@ from chainunit.capabilities.sizing.protection import Obstacle, Setting
 from chainunit.core.engines import MATH
 from chainunit.drives import v_belt
 from chainunit.drives.belt import _diameters
+from chainunit.drives.catalogue import motor_of_catalogue
 from chainunit.drives.v_belt import bending, torques
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import readings
@@ -38,10 +40,11 @@ from chainunit.study.torques import on_coupling
 from chainunit.study.verdict import STEADY
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-MILL = """
+MOTOR = "IE3 4-pole 0.37 kW, 71M"
+MILL = f"""
 event = []
 [system]
-motor = "IE3 4-pole 0.37 kW, 71M"
+motor = "{MOTOR}"
 """
 POWER, SPEED = 370.0, 1424.0 * math.pi / 30.0
 
@@ -377,6 +380,32 @@ def test_sizing_takes_the_line_into_its_trials(tmp_path):
     assert 0.0 < steady["slip_mean"]["value"] < 0.06
     chosen = result["sizing"]["candidates"][result["sizing"]["chosen"]]
     assert chosen["checks"]["start"]["value"]["value"] < result["answers"]["steady"]["speed_mean"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [
+        ("load_class = 'very heavy'", 1.6),
+        ("load_class = 'very heavy'\nhours = 8", 1.5),
+        ("service_factor = 2", 2.0),
+        # heavy by the inertia of the mill for so small a motor
+        ("", 1.5),
+    ],
+)
+def test_sizing_tensions_a_belt_as_it_orders_one(text, factor, tmp_path):
+    """The factor of DIN 7753-2; a gentle start has less, and a factor in the file of the belt is kept."""
+    motor = motor_of_catalogue(MOTOR)
+    for start, belt, wanted in (
+        ("direct", "", factor),
+        ("soft", "", factor if "service" in text else factor - 0.2),
+        ("direct", "service_factor = 1.4", 1.4),
+    ):
+        config = parse(f"event = []\nstart = '{start}'\n[belt]\nratio = 3\n{belt}\n[sizing]\n{text}\n")
+        placed = trials_of(config, duty_by(config, tmp_path)).candidate(motor).drive.line.part("belt")
+        assert placed.table.service_factor == pytest.approx(wanted, rel=1e-12)
+        assert placed.table.pretension == pytest.approx(
+            v_belt.usual_pretension(placed.table, wanted), rel=1e-12
+        )
 
 
 def test_a_belt_without_ratio_has_the_whole_ratio_of_a_machine_near_the_speed_of_the_motor():

@@ -258,6 +258,7 @@ class BeltPart(SlippingPart):
                 "diameter": "the standard pulley of a narrow V-belt for the rated torque times service_factor",
                 "distance": "both diameters together",
                 "pretension": "makers' rule for service_factor times the rated torque",
+                "service_factor": "with [sizing] by the class of its load and the start, else 1.3",
                 "J_motor": "cast iron pulley, half of a solid disc",
                 "J_driven": "cast iron pulley, half of a solid disc",
             },
