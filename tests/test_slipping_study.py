@@ -301,6 +301,11 @@ def result_of(name, folder):
         return result, run.load(), process.stdout
 
 
+def verdict_of(result):
+    """The clause on the machine that stands."""
+    return result["verdict"]["motor"]["text"].removesuffix(".").split("; ")[-1]
+
+
 @pytest.mark.second
 def test_the_mill_with_a_fluid_coupling_by_hand(tmp_path):
     """The motor turns on while the mill is jammed: the coupling takes its stall torque at the speed of the motor."""
@@ -327,6 +332,7 @@ def test_the_mill_with_a_fluid_coupling_by_hand(tmp_path):
         np.trapezoid(jam["fluid_coupling.dissipated_power"], jam["time"]), rel=0.02
     )
     assert steady["slip_mean"]["value"] == pytest.approx(0.018, rel=0.03)
+    assert verdict_of(result) == "the rotor stands after crushing rises (jam)"
     assert "fusible plug" in text and "IEC 60034-12" not in text
     assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
 
@@ -360,6 +366,7 @@ def test_the_belt_that_slips_by_hand(tmp_path):
     (shaft,) = (row for row in result["checks"]["rows"] if row["title"] == "overhung load of the shaft")
     assert shaft["value"]["value"] == pytest.approx(2.0 * tension * math.sin(0.5 * wrap), rel=0.01)
     assert "the belt slips through" in text
+    assert verdict_of(result) == "the rotor stands after crushing rises (jam)"
     assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
 
 
