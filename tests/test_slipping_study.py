@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
-from records import like
+from records import like, record_of
 from scipy.optimize import brentq
 from sizings import duty_by, trials_of
 
@@ -34,6 +34,7 @@ from chainunit.study import readings
 from chainunit.study.analyses import GearAnalysis
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
+from chainunit.study.line.belt import BeltFindings
 from chainunit.study.permitted_starts import starting_data
 from chainunit.study.rig import Rig
 from chainunit.study.torques import on_coupling
@@ -445,6 +446,15 @@ def test_a_belt_whose_pulleys_touch_is_refused_with_the_least_distance():
         InputError, match=r"belt\.distance = 50 mm: must be > .* mm, half of both pulleys; leave it out"
     ):
         drive("[gear]\nratio = 6\n[belt]\ndistance = '50 mm'\n")
+
+
+def test_a_gear_that_speeds_up_behind_a_belt_is_told():
+    for ratio, behind in ((2.0, 0.5), (8.0, None), (4.0, None)):
+        config = parse(MILL + f"[gear]\nratio = {ratio}\n[belt]\nratio = 4\n")
+        study = record_of(config, drive_of(config))
+        BeltFindings(0.1, 0.4, 3.0, 10.0, 500.0, 1e3, 30.0).remark(study)
+        told = [(remark.code, remark.quantities["behind"][0]) for remark in study.findings.remarks]
+        assert told == ([] if behind is None else [("gear-speeds-up", behind)])
 
 
 def test_a_belt_has_its_own_pulley_on_the_motor_shaft():

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
 from ...drives.catalogue_gears import CatalogueGear
@@ -92,9 +94,10 @@ class MotorTrials:
             share = task.tables.line_ratio(drive.ratio)
             ratio, series = ratio_on_offer(drive.ratio / share, plan.ratio_series, plan.offered, _TOLERANCE)
             drive = with_ratio(gear_ratio=share * ratio)
-        inertia = drive.whole_line.at_motor(self.duty.numbers.inertia_mean) / drive.fmu_parameters.rotor.J
-        tables = plan.tensioned(task.tables, inertia)
-        drive = with_slipping_parts(dataclasses.replace(drive, line=Line()), tables, motor.nameplate)
+        if task.tables.line:
+            inertia = np.mean(drive.whole_line.at_motor(self.duty.normal.inertia_at(drive.ratio)))
+            tables = plan.tensioned(task.tables, float(inertia / drive.fmu_parameters.rotor.J))
+            drive = with_slipping_parts(dataclasses.replace(drive, line=Line()), tables, motor.nameplate)
         behind = task.tables.ratio_behind(drive.ratio)
         unit = gear_unit(plan.gear_kind, behind, is_given=self.is_made)
         if unit is DIRECT and not self.has_given_ratio:
