@@ -422,6 +422,11 @@ def test_a_wrong_place_or_pin_is_refused_once(text, refusals):
         assert line.startswith(refusal) and ("give machine.width" in line) == ("unknown key" in line)
 
 
+def test_a_limit_of_0_has_no_digits_of_the_search():
+    with pytest.raises(InputError, match=r", bar\.bore = 0\.09 m must be >= 0 m and <= 0\.07999 m$"):
+        parse("[machine]\nwidth = 1\nbar = { diameter = 0.08, bore = 0.09 }\n")
+
+
 def test_pins_of_organs_differ_with_two_bars_alone():
     text = "organ = 'chain'\n[machine.pins]\nA.friction = 0.1\nB_left.friction = 0.1\n"
     with pytest.raises(InputError, match=r"^machine\.pins\.B_left: is of organs with two bars"):

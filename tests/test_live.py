@@ -304,6 +304,14 @@ def study_of(name):
     return study_files.load(EXAMPLES / name) if name.endswith(".toml") else study_files.parse(STUDIES[name])
 
 
+@pytest.mark.parametrize("name", ["inverter", "droop"])
+def test_the_slider_of_the_speed_tells_of_a_droop(name, tmp_path):
+    """With other loads the speed is not the one that the slider names, as the reference stays."""
+    live, _ = live_of(study_of(name), tmp_path)
+    (title,) = (each["title"] for each in live.data["quantities"] if each["role"] == "speed")
+    assert ("under the load of the study (droop)" in title) == (name == "droop")
+
+
 @pytest.mark.parametrize(
     "name", ["chain-unit", *(pytest.param(n, marks=pytest.mark.slow) for n in CHANGED if n != "chain-unit")]
 )

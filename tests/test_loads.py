@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from records import record_of
 
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.study.choice import drive_of
+from chainunit.study.config import parse
+from chainunit.study.remarks import _on_backward_pull
 
 FOLDER = Path(__file__).parents[1] / "examples" / "loads"
 TURN = np.linspace(0.0, 2.0 * math.pi, 721)[:-1]
@@ -79,6 +83,29 @@ def test_a_hoist_lowers_with_less_than_it_lifts():
     assert inertia("hoist") == pytest.approx(1.8 + 3320.0 * 0.05**2, rel=1e-12)
     # lowering, the load gives its power to the motor
     assert np.all(outputs("hoist", -10.0).power < 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "gear", "least"),
+    [
+        # the lift less the friction of DIN 22101
+        ("conveyor", 0.95, 9.81 * (60.0 * 9.0 - 1.8 * 0.022 * 120.0 * 106.0) * 0.25),
+        ("hoist", 0.95, 0.94 * 3320.0 * 9.81 * 0.2 / 4.0),
+        # a gear with less than half of its efficiency is self-locking
+        ("hoist", 0.48, None),
+        ("hammer_mill", 0.95, None),
+    ],
+)
+def test_a_load_that_turns_its_machine_back_needs_a_backstop(name, gear, least):
+    config = parse(
+        f"event = []\n[machine]\nlinkage = '{(FOLDER / name).as_posix()}.toml'\n[gear]\nefficiency = {gear}\n"
+        "[system]\nmotor = 'IE3 4-pole 22 kW, 180L'\n[run]\ncrank_speed = 6\n"
+    )
+    study = record_of(config, drive_of(config))
+    _on_backward_pull(study)
+    torques = [remark.quantities["torque"][0] for remark in study.findings.remarks]
+    # the friction fades at slow speed
+    assert torques == ([] if least is None else [pytest.approx(least, rel=0.05)])
 
 
 def test_a_spindle_cuts_by_kienzle_while_a_tooth_is_in_the_work():

@@ -56,12 +56,17 @@ def test_a_page_that_is_printed_without_waiting_has_its_plots(tmp_path):
     assert len(re.findall(r"torque", text)) == 2 and len(re.findall(r"speed", text)) == 2
 
 
-def test_long_work_is_told_with_its_forecast_once():
+def test_long_work_is_told_with_its_forecast_until_that_ends():
     forecast = Forecast()
     assert not forecast.words(0.0, "the start-up", 0.0, 100.0)
     assert not forecast.words(4.0, "the start-up", 2.0, 100.0), "too early"
     assert forecast.words(6.0, "the start-up", 3.0, 100.0) == "About 3 min more: the start-up."
     assert not forecast.words(12.0, "the start-up", 6.0, 100.0), "told before"
+    # it slows down: 194 s after the forecast there is as much left again, and more
+    assert not forecast.words(199.0, "the start-up", 40.0, 100.0)
+    assert forecast.words(201.0, "the start-up", 40.0, 100.0) == "About 5 min more: the start-up."
+    assert not forecast.words(300.0, "the start-up", 50.0, 100.0), "told before"
+    assert not forecast.words(600.0, "the start-up", 95.0, 100.0), "less than a minute"
     # other work, which is nearly done
     assert not forecast.words(20.0, "energy", 0.0, 10.0) and not forecast.words(40.0, "energy", 9.0, 10.0)
     # work whose amount is not known

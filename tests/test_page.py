@@ -525,6 +525,8 @@ def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
         and "crank at 6 rad/s" not in text
     )
     assert "The motor does NOT reach the speed: 3.74 rad/s in place of 6 rad/s" in text
+    answers["steady"] = dataclasses.replace(answers["steady"], speed_mean=7.0)
+    assert "6 rad/s (57.3 rev/min) NOT kept, too fast" in said_of(changed(study, answers=answers))
     result = as_dict(slow)
     assert result["verdict"]["motor"]["holds"] == "false"
 

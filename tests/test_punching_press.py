@@ -109,7 +109,10 @@ def test_the_frequency_of_an_inverter_falls_with_the_torque():
 
 def test_a_droop_is_of_an_inverter_that_compensates_no_slip():
     for text, refusal in (
-        ('start = "soft"\n[starter]\ndroop = 0.08\n', "starter.droop: is of an inverter"),
+        (
+            'start = "soft"\n[starter]\ndroop = 0.08\n',
+            'starter.droop: is of an inverter; set start = "inverter" before all tables',
+        ),
         (
             'start = "inverter"\n[starter]\ndroop = 0.08\ninverter = { slip = 0.1 }\n',
             "starter.inverter.slip: works against",

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
-from records import like
+from records import like, record_of
 from scipy.optimize import brentq
+from sizings import duty_by, trials_of
 
 from chainunit import InputError
 from chainunit.capabilities.checks.coupling import inertias
@@ -26,22 +27,25 @@ from chainunit.capabilities.sizing.protection import Obstacle, Setting
 from chainunit.core.engines import MATH
 from chainunit.drives import v_belt
 from chainunit.drives.belt import _diameters
+from chainunit.drives.catalogue import motor_of_catalogue
 from chainunit.drives.v_belt import bending, torques
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import readings
 from chainunit.study.analyses import GearAnalysis
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
+from chainunit.study.line.belt import BeltFindings
 from chainunit.study.permitted_starts import starting_data
 from chainunit.study.rig import Rig
 from chainunit.study.torques import on_coupling
 from chainunit.study.verdict import STEADY
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-MILL = """
+MOTOR = "IE3 4-pole 0.37 kW, 71M"
+MILL = f"""
 event = []
 [system]
-motor = "IE3 4-pole 0.37 kW, 71M"
+motor = "{MOTOR}"
 """
 POWER, SPEED = 370.0, 1424.0 * math.pi / 30.0
 
@@ -298,6 +302,11 @@ def result_of(name, folder):
         return result, run.load(), process.stdout
 
 
+def verdict_of(result):
+    """The clause on the machine that stands."""
+    return result["verdict"]["motor"]["text"].removesuffix(".").split("; ")[-1]
+
+
 @pytest.mark.second
 def test_the_mill_with_a_fluid_coupling_by_hand(tmp_path):
     """The motor turns on while the mill is jammed: the coupling takes its stall torque at the speed of the motor."""
@@ -324,6 +333,7 @@ def test_the_mill_with_a_fluid_coupling_by_hand(tmp_path):
         np.trapezoid(jam["fluid_coupling.dissipated_power"], jam["time"]), rel=0.02
     )
     assert steady["slip_mean"]["value"] == pytest.approx(0.018, rel=0.03)
+    assert verdict_of(result) == "the rotor stands after crushing rises (jam)"
     assert "fusible plug" in text and "IEC 60034-12" not in text
     assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
 
@@ -357,6 +367,7 @@ def test_the_belt_that_slips_by_hand(tmp_path):
     (shaft,) = (row for row in result["checks"]["rows"] if row["title"] == "overhung load of the shaft")
     assert shaft["value"]["value"] == pytest.approx(2.0 * tension * math.sin(0.5 * wrap), rel=0.01)
     assert "the belt slips through" in text
+    assert verdict_of(result) == "the rotor stands after crushing rises (jam)"
     assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
 
 
@@ -377,6 +388,32 @@ def test_sizing_takes_the_line_into_its_trials(tmp_path):
     assert 0.0 < steady["slip_mean"]["value"] < 0.06
     chosen = result["sizing"]["candidates"][result["sizing"]["chosen"]]
     assert chosen["checks"]["start"]["value"]["value"] < result["answers"]["steady"]["speed_mean"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [
+        ("load_class = 'very heavy'", 1.6),
+        ("load_class = 'very heavy'\nhours = 8", 1.5),
+        ("service_factor = 2", 2.0),
+        # heavy by the inertia of the mill for so small a motor
+        ("", 1.5),
+    ],
+)
+def test_sizing_tensions_a_belt_as_it_orders_one(text, factor, tmp_path):
+    """The factor of DIN 7753-2; a gentle start has less, and a factor in the file of the belt is kept."""
+    motor = motor_of_catalogue(MOTOR)
+    for start, belt, wanted in (
+        ("direct", "", factor),
+        ("soft", "", factor if "service" in text else factor - 0.2),
+        ("direct", "service_factor = 1.4", 1.4),
+    ):
+        config = parse(f"event = []\nstart = '{start}'\n[belt]\nratio = 3\n{belt}\n[sizing]\n{text}\n")
+        placed = trials_of(config, duty_by(config, tmp_path)).candidate(motor).drive.line.part("belt")
+        assert placed.table.service_factor == pytest.approx(wanted, rel=1e-12)
+        assert placed.table.pretension == pytest.approx(
+            v_belt.usual_pretension(placed.table, wanted), rel=1e-12
+        )
 
 
 def test_a_belt_without_ratio_has_the_whole_ratio_of_a_machine_near_the_speed_of_the_motor():
@@ -409,6 +446,15 @@ def test_a_belt_whose_pulleys_touch_is_refused_with_the_least_distance():
         InputError, match=r"belt\.distance = 50 mm: must be > .* mm, half of both pulleys; leave it out"
     ):
         drive("[gear]\nratio = 6\n[belt]\ndistance = '50 mm'\n")
+
+
+def test_a_gear_that_speeds_up_behind_a_belt_is_told():
+    for ratio, behind in ((2.0, 0.5), (8.0, None), (4.0, None)):
+        config = parse(MILL + f"[gear]\nratio = {ratio}\n[belt]\nratio = 4\n")
+        study = record_of(config, drive_of(config))
+        BeltFindings(0.1, 0.4, 3.0, 10.0, 500.0, 1e3, 30.0).remark(study)
+        told = [(remark.code, remark.quantities["behind"][0]) for remark in study.findings.remarks]
+        assert told == ([] if behind is None else [("gear-speeds-up", behind)])
 
 
 def test_a_belt_has_its_own_pulley_on_the_motor_shaft():

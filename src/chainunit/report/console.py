@@ -122,9 +122,8 @@ def exit_status(error: BaseException) -> int:
 @contextmanager
 def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], None]]:
     """A progress bar that begins with the first report, so that a fault of the input is shown without a bar. Work
-    that takes longer than a minute is told with its forecast, once for each amount of work; also where the console is
-    no terminal and shows no bar. Yields the function that reports the current task, the complete amount of work, and
-    the total amount."""
+    that takes longer than a minute is told with its forecast, also where the console is no terminal and shows no bar.
+    Yields the function that reports the current task, the complete amount of work, and the total amount."""
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -152,20 +151,20 @@ class Forecast:
     """The time that work will take, from the reports of its progress."""
 
     def __init__(self) -> None:
-        self._todo, self._begin, self._first, self._is_told = -1.0, 0.0, 0.0, False
+        self._todo, self._begin, self._first, self._end = -1.0, 0.0, 0.0, 0.0
 
     def words(self, now: float, what: str, done: float, todo: float) -> str:
         """The forecast at the time `now` [s] in a sentence, the first time that it is sure enough and above a minute
-        for this amount of work; else empty."""
+        for this amount of work, and again at the end that it named; else empty."""
         if todo != self._todo:
-            self._todo, self._begin, self._first, self._is_told = todo, now, done, False
+            self._todo, self._begin, self._first, self._end = todo, now, done, 0.0
         spent, progress = now - self._begin, done - self._first
-        if self._is_told or spent < _SURE or progress <= 0.0:
+        if now < self._end or spent < _SURE or progress <= 0.0:
             return ""
         left = spent * (todo - done) / progress
         if left < _LONG:
             return ""
-        self._is_told = True
+        self._end = now + left
         return f"About {left / 60.0:.0f} min more: {what}."
 
 

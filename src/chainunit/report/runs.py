@@ -93,7 +93,8 @@ def table_of_runs(study: StudyRecord) -> b.Table:
     if "steady" in answers:
         head = line(setup.driver_noun, " at ", number(runs, "steady", "speed_mean"))
     if not runs.reaches:
-        head = filled("{}; {} NOT reached", head, asked_speed(setup))
+        over = study.runs.answers["steady"].speed_mean > setup.config.run.crank_speed
+        head = filled("{}; {} NOT {}", head, asked_speed(setup), "kept, too fast" if over else "reached")
     title = f"Demands of each run on the drive{_doubt(setup)}"
     return over_runs(runs, names, rows, title, plain_line(head, setup.config.units))
 

@@ -13,6 +13,9 @@ else:
     Dataset = Any
 
 
+_NOISE = 1e-12
+
+
 def peak(x: Any) -> float:
     """Largest size of an array."""
     return float(np.max(np.abs(x)))
@@ -21,6 +24,11 @@ def peak(x: Any) -> float:
 def rms(x: Any) -> float:
     """Root of the mean square of an array."""
     return float(np.sqrt(np.mean(np.square(x))))
+
+
+def above_noise(value: float, scale: float) -> float:
+    """The value, or 0 where it is the rounding of numbers of the size `scale`."""
+    return value if abs(value) > _NOISE * scale else 0.0
 
 
 def stretches(inside: Any) -> list[tuple[int, int]]:

@@ -13,6 +13,7 @@ from ..core.quantities import Layout
 from ..machines.across import PLACES, middle_of
 from ..machines.chain_unit import Feed, SideName, other
 from ..machines.machine import Machine
+from .arrays import above_noise, peak
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def energy_swing(torque: Any) -> float:
     speed). The `torque` [N m] is evenly spaced in angle, shape (n,)."""
     torque = np.asarray(torque, dtype=float)
     excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
-    return float(np.ptp(excess))
+    return above_noise(float(np.ptp(excess)), 2.0 * math.pi * peak(torque))
 
 
 def needed_inertia(swing: float, speed: float, fluctuation: float, there: float = 0.0) -> float:

@@ -171,6 +171,10 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
     if stalls:
         dips = (f"{runs.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items())
         text += f"; its speed dips as in a stall ({', '.join(dips)})"
+    # behind a part that slips the motor has a reserve while the machine stands
+    stands = [runs.title_of(name) for name, answers in runs.answers.items() if answers.stall_time is not None]
+    if stands and setup.drive.line.before_gear is not None:
+        text += f"; the {setup.driver_noun} stands after {', '.join(stands)}"
     if left_out:
         names = ", ".join(map(runs.title_of, left_out))
         text += f"; runs whose energy balance is not kept are left out ({names})"

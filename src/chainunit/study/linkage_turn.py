@@ -24,6 +24,7 @@ from ..mechanism.assur import DYADS, PRISMATIC
 from ..mechanism.sampled_quantities import largest, means, roots
 from ..reading.results import InUnit, part, result
 from ..reading.tables import UnusualValue, option_value, slips_of
+from .arrays import above_noise
 
 PLACES = 361
 USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
@@ -263,7 +264,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         torque_rms=torque_rms,
         torque_mean=mean,
         power_mean=mean * speed,
-        inertia_least=-top["-inertia"],
+        inertia_least=above_noise(-top["-inertia"], top["inertia"]),
         inertia_largest=top["inertia"],
         energy_gap=float(np.max(gap) / max(np.max(np.abs(torque)), 1e-300)),
     )

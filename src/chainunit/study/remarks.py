@@ -15,6 +15,7 @@ from .analyses import all_analyses
 from .arrays import peak
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
+from .cycle import cycle
 from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
 from .measures import STARTED, Answers
@@ -79,6 +80,7 @@ def conclude(study: StudyRecord) -> None:
         _on_start(study)
         _on_star(study)
         _on_inertia(study)
+        _on_backward_pull(study)
         _on_limits(study)
         _on_steady_running(study, study.runs.answers[STEADY])
         if study.setup.drive.foreign is None:
@@ -446,6 +448,28 @@ def _on_inertia(study: StudyRecord) -> None:
     limit = standard_inertia(setup.drive, plate.nameplate, study.runs.steady, setup.config.drive.start)
     if limit is not None and limit[0] > limit[1]:
         study.findings.say(_HEAVY, START, inertia=limit[0], most=limit[1])
+
+
+_PULLED_BACK = warning(
+    "pulled-back",
+    "The load turns the {driver} backwards without the motor, with {torque} or more from any angle.",
+    "A backstop (holdback) or a brake is needed.",
+    sizes={"N.m": "torque"},
+)
+_BACKWARDS = -0.1
+"""Speed of the turn that shows whether a load turns its machine back, over the requested one: the friction holds, and
+the resistance of air or liquid is small."""
+
+
+def _on_backward_pull(study: StudyRecord) -> None:
+    """Warn of a load that no angle of the crank holds without the motor, as the weight of goods on a conveyor that
+    rises. A gear that loses as much as it passes on holds it."""
+    setup = study.setup
+    if setup.drive.foreign_machine or setup.drive.gear_loss >= 1.0:
+        return
+    turn = cycle(setup.config.machine, _BACKWARDS * setup.config.run.crank_speed, setup.config.feed)
+    if (torque := float(np.min(turn.crank_torque))) > 0.0:
+        study.findings.say(_PULLED_BACK, STEADY, torque=torque)
 
 
 _HAPPENINGS = {

@@ -179,7 +179,7 @@ def _of_motors() -> Iterator[Rule]:
     for key in ("J", "fluctuation", "compare"):
         yield Rule(f"flywheel.{key}", chosen, "sizing finds its own; leave out one of the two")
     yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), refusal, switched_on)
-    refusal = 'is of an inverter; set start = "inverter", or leave it out'
+    refusal = 'is of an inverter; set start = "inverter" before all tables, or leave it out'
     yield Rule("starter.droop", ~is_one_of("start", "inverter"), refusal)
     refusal = "works against the droop (starter.droop); leave out one of the two"
     yield Rule("starter.inverter.slip", given("starter.droop"), refusal)

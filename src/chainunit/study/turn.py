@@ -10,7 +10,7 @@ import numpy as np
 from ..core.quantities import Value, declaration, quantity
 from ..reading.results import derived, part, result
 from .analysis import Analysis, Findings, Work
-from .arrays import peak
+from .arrays import above_noise, peak
 from .cycle import Cycle, cycle, energy_swing, no_feed
 from .record import StudyRecord
 
@@ -95,11 +95,11 @@ class TurnAnalysis(Analysis):
             Turn(
                 torque_peak=peak(loaded.crank_torque),
                 torque_peak_free=peak(free.crank_torque),
-                torque_mean=float(np.mean(loaded.crank_torque)),
+                torque_mean=above_noise(float(np.mean(loaded.crank_torque)), peak(loaded.crank_torque)),
                 lost=_lost_energy(loaded, config.operation.turn),
                 lost_free=_lost_energy(free, config.operation.turn),
                 energy_swing=energy_swing(loaded.crank_torque),
-                inertia_least=float(np.min(inertia)),
+                inertia_least=above_noise(float(np.min(inertia)), peak(inertia)),
                 inertia_largest=float(np.max(inertia)),
                 inertia_mean=float(np.mean(inertia)),
                 margin=float(np.min(loaded.outputs.margin)) if hasattr(loaded.outputs, "margin") else None,

@@ -650,7 +650,7 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
     monkeypatch.setattr(torsion_analysis, "analyse", only_line)
     text = f"{SYSTEM}{BARE}[run]\ncrank_speed = '{speed}'\n"
     # a table of its own asks for it
-    for more in ("", "[torsion]\nspeeds = 2\n"):
+    for more in ("", "[torsion]\n", "[torsion]\nspeeds = 2\n"):
         study = study_of(text + more)
         found = TorsionAnalysis.find(
             study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)

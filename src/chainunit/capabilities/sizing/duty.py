@@ -15,6 +15,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...fmu.backends import Backend
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import derived, part, result
+from ...study.arrays import above_noise, peak
 from ...study.cycle import Cycle, all_on_one, cycle, energy_swing, needed_inertia
 from ...study.organs import ConstantSpeed, OrganModel
 from ...study.quantiles import HIGH
@@ -118,7 +119,7 @@ def cycle_numbers(
         torque_peak=_peak(normal),
         torque_peak_one_sided=max(map(_peak, one_sided.values()), default=None),
         torque_rms=rms(*parts),
-        inertia_least=float(np.min(inertia)),
+        inertia_least=above_noise(float(np.min(inertia)), peak(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
         inertia_wanted=wanted,

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
 from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_ratios import DIRECT, gear_unit, next_ratio, ratio_on_offer
-from ...study.catalogue_drive import catalogue_drive, with_inertia
+from ...study.catalogue_drive import catalogue_drive, with_inertia, with_slipping_parts
 from ...study.limits import SPEED_DEVIATION
+from ...study.line.placed import Line
 from .candidate import Candidate, TrialResult
 from .duty import Duty
 from .gear_rows import helps, rows_for, spent, unit_of
@@ -71,14 +74,9 @@ class MotorTrials:
         """A candidate without a flywheel, with a `gear` of the catalogue, or with the `chosen` ratio, or that of the
         file, or the ratio on offer that is nearest to the one at which the crank has its speed."""
         plan, task, series = self.plan, self.task.of_gear(gear), ""
+        ambient, offer = plan.demands.ambient, plan.offer
         with_ratio = partial(
-            catalogue_drive,
-            task.tables,
-            task.machine,
-            self.duty.normal,
-            motor,
-            plan.demands.ambient,
-            offer=plan.offer,
+            catalogue_drive, task.tables, task.machine, self.duty.normal, motor, ambient, offer=offer
         )
         drive = with_ratio(gear_ratio=chosen)
         if gear is not None:
@@ -96,6 +94,10 @@ class MotorTrials:
             share = task.tables.line_ratio(drive.ratio)
             ratio, series = ratio_on_offer(drive.ratio / share, plan.ratio_series, plan.offered, _TOLERANCE)
             drive = with_ratio(gear_ratio=share * ratio)
+        if task.tables.line:
+            inertia = np.mean(drive.whole_line.at_motor(self.duty.normal.inertia_at(drive.ratio)))
+            tables = plan.tensioned(task.tables, float(inertia / drive.fmu_parameters.rotor.J))
+            drive = with_slipping_parts(dataclasses.replace(drive, line=Line()), tables, motor.nameplate)
         behind = task.tables.ratio_behind(drive.ratio)
         unit = gear_unit(plan.gear_kind, behind, is_given=self.is_made)
         if unit is DIRECT and not self.has_given_ratio:

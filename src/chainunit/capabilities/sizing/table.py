@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from pydantic import Field, StrictBool
@@ -14,6 +14,7 @@ from ...drives.gearing import Transmission
 from ...drives.service_factor import LOAD_CLASSES, LOAD_WORDS, belt_factor, gear_factor, load_class
 from ...study.catalogue_drive import GearOffer
 from ...study.file_section import numbers
+from ...study.operation import DriveTables
 
 
 @declaration
@@ -203,6 +204,17 @@ class SizingPlan:
         load, hours = self.load(inertia_factor), float(self.demands.hours)
         factor = belt_factor(load, hours, is_on_line=is_on_line)
         return float(self.demands.service_factor) or factor
+
+    def tensioned(self, tables: DriveTables, inertia_factor: float) -> DriveTables:
+        """The `tables` with a belt that has the tension for its service factor, unless the file gives one."""
+        factor = self.belt_factor(inertia_factor, tables.start == "direct")
+        line = (
+            replace(part, table=part.filled(part.table, service_factor=factor))
+            if part.name == "belt"
+            else part
+            for part in tables.line
+        )
+        return replace(tables, line=tuple(line))
 
     def service_words(self, inertia_factor: float) -> str:
         """The source of the service factor of a gear in words; see `gear_factor`."""

@@ -97,7 +97,7 @@ class TorsionAnalysis(Analysis):
         assert modes is not None
         turn, ratio = study.setup.statics.normal, drive.ratio / drive.line.ratio
         speed = float(config.run.crank_speed * ratio)
-        if not config.file.gives("torsion") and speed < SLOW * modes.k_least:
+        if "torsion" not in config.file.tables and speed < SLOW * modes.k_least:
             study.findings.say(_LEFT_OUT, speed=speed, k_least=modes.k_least)
             return None
         inertia = turn.inertia_at(drive.ratio)

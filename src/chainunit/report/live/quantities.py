@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...core.descriptions import of_driver
@@ -63,9 +63,12 @@ def of_machine(table: str, declared: Any, model_names: Collection[str] = ()) -> 
             yield LiveQuantity((table, *v.name.split(".")), v, value, table, (v.name,), runs)
 
 
-def speed_of_crank(value: float) -> LiveQuantity:
-    """The speed of the crank [rad/s]."""
+def speed_of_crank(value: float, has_droop: bool = False) -> LiveQuantity:
+    """The speed of the crank [rad/s]; behind an inverter with a droop, the page sets its reference higher by the fall
+    with the load of the study, whatever the load is."""
     variable = variable_of(Run, "crank_speed")
+    if has_droop:
+        variable = replace(variable, template=f"{variable.template}, under the load of the study (droop)")
     return LiveQuantity(("run", "crank_speed"), variable, value, "drive", role="speed")
 
 

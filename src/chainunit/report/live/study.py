@@ -59,7 +59,7 @@ def of_study(
     model_names = runs.names if runs else set()
     chosen = [*of_machine("feed", config.feed, model_names)]
     if drive.follows or drive.foreign is not None:
-        chosen.append(speed_of_crank(float(speed)))
+        chosen.append(speed_of_crank(float(speed), bool(drive.droop_speed)))
     chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, model_names)]
     if runs:
         chosen += [*runs.quantities, *_flywheel(drive)]

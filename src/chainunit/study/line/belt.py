@@ -141,7 +141,10 @@ class BeltFindings(Findings):
     answers: Mapping[str, BeltAnswers] = part("load of the belt, by run", default_factory=dict)
 
     def remark(self, study: StudyRecord) -> None:
-        """The runs in which the belt slips through."""
+        """A gear behind the belt that speeds the machine up, and the runs in which the belt slips through."""
+        drive = study.setup.drive
+        if drive.is_geared and (behind := drive.ratio / drive.line.ratio) < 1.0:
+            study.findings.say(_SPEEDS_UP, belt=drive.line.ratio, behind=behind)
         for name, answers in self.answers.items():
             if answers.slipping_time:
                 event = study.setup.config.events.get(name)
@@ -156,6 +159,12 @@ class BeltFindings(Findings):
                 )
 
 
+_SPEEDS_UP = warning(
+    "gear-speeds-up",
+    "The belt slows the shaft down by {belt}, and the gear behind it speeds it up again, as its ratio is {behind}.",
+    remedy="Leave belt.ratio out, so that the belt has the whole ratio.",
+    sizes={"1": "belt behind"},
+)
 _SLIPS_THROUGH = (
     "{title}: the belt slips through for {time}, at up to {torque} at the motor's shaft.",
     "It turns {heat} into heat.",
@@ -258,6 +267,7 @@ class BeltPart(SlippingPart):
                 "diameter": "the standard pulley of a narrow V-belt for the rated torque times service_factor",
                 "distance": "both diameters together",
                 "pretension": "makers' rule for service_factor times the rated torque",
+                "service_factor": "with [sizing] by the class of its load and the start, else 1.3",
                 "J_motor": "cast iron pulley, half of a solid disc",
                 "J_driven": "cast iron pulley, half of a solid disc",
             },
