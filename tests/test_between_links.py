@@ -222,6 +222,7 @@ def test_the_report(name, words):
     assert findings.turn.energy_gap < 1e-12
     assert words.count("(") == len(data.groups)
     assert drawing(machine).count("<polygon") + drawing(machine).count("<polyline") >= 3
+    assert drawing(machine).count('r="13.00"') == (name in DRIVEN)  # the ring of a motor in a pin
 
 
 BRANCHES = {

@@ -80,6 +80,10 @@ class Crank(Driver):
         return (HingeData(self.bar.pin, self.bar.name, None, self.on),)
 
     @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        return ((self.bar.pin, self.bar.pin),) if self.on else ()
+
+    @property
     def inertia(self) -> Any:
         """Inertia of the crank alone about its bearing [kg m2]."""
         return _inertia_about_start(self.bar.mass)
@@ -217,6 +221,10 @@ class Elbow(Driver):
             HingeData(self.end, arm, lever.name),
             HingeData(lever.pin, lever.name),
         )
+
+    @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        return ((self.joint, self.joint),)
 
     @property
     def inertia(self) -> Any:

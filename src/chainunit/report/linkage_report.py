@@ -96,7 +96,7 @@ def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     yield from (b.Text(note, "note") for note in x.notes)
     yield b.Drawing(
         drawing(f.machine), "The linkage: its pins, links and dimensions", PICTURES[0],
-        "A pair of hatched lines is a guide in the ground; a box is a block.",
+        "A pair of hatched lines is a guide in the ground, a box a block, a ring a motor in a pin.",
     )  # fmt: skip
 
 
