@@ -57,12 +57,15 @@ def driver_axis(machine: Machine, low: float | None = None, high: float | None =
 
 def reactions(machine: Machine) -> Iterator[tuple[str, str, str, str]]:
     """Output, title, joint and name in the picture of each reaction. The name is the title in a linkage file, else
-    empty, for that of the joint."""
-    model = machine.model
+    empty, for that of the joint. The share of a reaction, whose arrow would cover that of the whole, has an empty
+    joint."""
+    model, wholes = machine.model, set()
     is_file = hasattr(model, "described_by")
     for title, output in model.pins.items():
         if output in model.joints:
-            yield output, title, model.joints[output][0], title if is_file else ""
+            joint = model.joints[output]
+            yield output, title, "" if joint in wholes else joint[0], title if is_file else ""
+            wholes.add(joint)
 
 
 def arrows(
@@ -71,10 +74,10 @@ def arrows(
     groups: Mapping[str, str] | None = None,
     hidden: Collection[str] = (),
 ) -> Iterator[Arrow]:
-    """An arrow for each reaction, but those of the `hidden` outputs. `groups` gives the group of an output, `force`
-    the components of its reaction [N]."""
+    """An arrow for each reaction, but shares and `hidden` outputs. `groups` gives the group of an output,
+    `force` the components of its reaction [N]."""
     for output, title, joint, short in reactions(machine):
-        if output not in hidden:
+        if joint and output not in hidden:
             yield Arrow(title, joint, *force(output), short=short, group=(groups or {}).get(output, ""))
 
 

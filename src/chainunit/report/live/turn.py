@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.printing.javascript import model_text
+from ...core.quantities import Variable
 from ...core.symbolic_trace import trace
 from ...machines.machine import Machine
 from ...mechanism.sketch import places
@@ -109,11 +110,12 @@ def _results(
         rows.insert(3, ("rocker torque, peak", "peak", "rocker.tau", "N.m", ""))
     if "margin" in model_columns:
         rows.append(("margin from a dead position, least", "min", "margin", "1", ""))
-    for title, reduction, column, row_unit, by in rows:
+    beside = [(f"{v.description}, peak", "peak", v.name, v.unit, "", v.kind) for v in _efforts(model)]
+    for title, reduction, column, row_unit, by, kind in (*((*row, "") for row in rows), *beside):
         yield {
             "name": f"{reduction}({column})" + (f" {by}" if by else ""),
             "title": title, "reduce": reduction, "of": column, "by": by, "group": "",
-            **shown_in_unit(row_unit, "", units),
+            **shown_in_unit(row_unit, kind, units),
         }  # fmt: skip
     for force in forces:
         column = f"force({force['of']})"
@@ -121,6 +123,17 @@ def _results(
             "name": f"peak({column})", "title": force["title"], "reduce": "peak", "of": column, "by": "",
             "group": "pins", **shown_in_unit("N", "", units),
         }  # fmt: skip
+
+
+def _efforts(model: Any) -> list[Variable]:
+    """The outputs that are efforts of drivers beside the first one, or loads of the bar between two rockers."""
+    outputs = {v.name: v for part in model.parts for v in part.layout.variables}
+    return [
+        v
+        for name, v in outputs.items()
+        for group, _, last in [name.rpartition(".")]
+        if group == "bar" or (last == "tau" and f"{group}.power" in outputs)
+    ]
 
 
 def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
@@ -148,6 +161,8 @@ def _curves(machine: Machine, model_columns: Any, units: Units) -> Iterator[dict
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
     if "rocker.tau" in model_columns:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
+    drivers = (v for v in _efforts(model) if v.name.endswith(".tau") and v.unit == port("N.m"))
+    curves += [{"title": capital(v.description), "of": v.name, "by": ""} for v in drivers]
     yield {
         "name": "torque",
         "title": capital(effort),
