@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from between_links import FIVE_BAR
 
 from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of
@@ -154,3 +155,27 @@ def test_guides_that_become_parallel_are_a_dead_position():
     }
     with pytest.raises(InputError, match="its two guides are parallel, so that its forces have no limit"):
         machine_of(description_of(data, "parallel"))
+
+
+def test_an_elbow_that_does_not_close_is_told_with_gap_and_lever():
+    """The arms B-C and C-D with the law of their motor are one side of the triangle B-D-E: the limits of the lever
+    follow from |B-E| and from the reach of the arms."""
+    law = 'phi = "0.3 * sin(phi) + 110 deg"\nby = "motor"'
+
+    def with_lever(length):
+        return machine(FIVE_BAR.format(law=law).replace("D = [0.6, 0]", f"D = [{length}, 0]"))
+
+    with pytest.raises(
+        InputError, match=r"pins B and E are 1000 mm apart, its arms reach over 1230 mm"
+    ) as caught:
+        with_lever(0.1)
+    q = np.linspace(0.0, 2.0 * math.pi, 721)
+    # the frame of the second arm starts at D
+    reach = np.abs(0.8 - 0.7 * np.exp(1j * (0.3 * np.sin(q) + math.radians(110.0))))
+    apart = np.abs(1.2 - 0.2 * np.exp(1j * q))
+    told = re.search(r"length of right between (\S+) mm and (\S+) mm closes it", str(caught.value)).groups()
+    low, high = (1e-3 * float(x) for x in told)
+    assert low == pytest.approx(np.max(np.abs(reach - apart)), abs=1e-3)
+    assert high == pytest.approx(np.min(reach + apart), abs=2e-3)
+    for length in (low + 0.02, high - 0.02):
+        with_lever(length)

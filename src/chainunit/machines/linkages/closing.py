@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
+from ...core.engines import MATH
 from ...core.errors import InputError
+from ...groups.driver import Elbow
 from ...groups.dyad import RRP, Dyad
 from ...groups.group import Group
 from ...mechanism.assur import AssurGroup
@@ -69,8 +71,10 @@ def open_group(
     places : that at which the group does not close, then those over the way
     """
     hint = ": change its lengths"
-    if isinstance(dyad, Dyad | RRP):
-        with suppress(ArithmeticError, ValueError, IndexError):
+    with suppress(ArithmeticError, ValueError, IndexError):
+        if isinstance(dyad, Elbow):
+            hint = _elbow_hint(dyad, [before(place) for place in places])
+        elif isinstance(dyad, Dyad | RRP):
             apart = _apart(dyad, before(places[0]))
             gap, size = _gap(dyad, apart)
             if gap <= _ROUNDING * size:
@@ -120,6 +124,25 @@ def _gap_hint(group: Dyad | RRP, apart: Sequence[float]) -> str:
             bar.name: (max(most - length, length - least), least + length)
             for bar, length in ((first, second.length), (second, first.length))
         }
+    return f": {state}; {_remedy(limits)}"
+
+
+def _elbow_hint(group: Elbow, states: Sequence[Mechanism]) -> str:
+    """The same words on two arms with a motor and their lever, from the linkage before them."""
+    lever, pins = group.lever, (group.bar.pin, group.lever.pin)
+    angles = (group.course_at(MATH, m.q).place for m in states)
+    reaches = [math.sqrt(group.reach(MATH, angle)[1].squared()) for angle in angles]
+    apart = [math.sqrt((m.pins[pins[0]].p - m.pins[pins[1]].p).squared()) for m in states]
+    both = list(zip(reaches, apart, strict=True))
+    limits = max(abs(reach - d) for reach, d in both), min(reach + d for reach, d in both)
+    return (
+        f": its pins {pins[0]} and {pins[1]} are {_mm(apart[0])} apart, its arms reach over {_mm(reaches[0])}, and "
+        f"{lever.name} is {_mm(lever.length)} long; {_remedy({lever.name: limits})}"
+    )
+
+
+def _remedy(limits: Mapping[str, tuple[float, float]]) -> str:
+    """The lengths that close a group all the way, by link its least and its largest one [m]."""
     fits = []
     for name, (low, high) in limits.items():
         if high - low > _ROUNDED * low:
@@ -127,8 +150,7 @@ def _gap_hint(group: Dyad | RRP, apart: Sequence[float]) -> str:
             fits.append(
                 f"a length of {name} {'between' if most_text else 'above'} {_mm(low, 1.0)}{most_text}"
             )
-    remedy = f"{' or '.join(fits)} closes it all the way" if fits else "change both lengths"
-    return f": {state}; {remedy}"
+    return f"{' or '.join(fits)} closes it all the way" if fits else "change its lengths"
 
 
 def _mm(length: float, sense: float = 0.0) -> str:
