@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from ..core.files import write_file
 from ..machines.linkages.joint_kinds import KINDS
 from ..machines.machine import Machine
 from ..mechanism.machine import MachineState
@@ -28,6 +29,8 @@ from .task import Task, no_check
 PICTURES = (
     "linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png", "linkage_rest.png"
 )  # fmt: skip
+COPY = "linkage_copy.toml"
+"""Name of the copy of the linkage file in the folder of the result."""
 _PICTURES = 120
 """Pictures of a turn, or of the way there and back."""
 
@@ -43,6 +46,8 @@ class LinkageQuestion(NamedTuple):
     """values of the file that are of an unusual size"""
     remarks: tuple[str, ...] = ()
     """sentences on a linkage from a drawing of another program"""
+    text: str = ""
+    """the linkage file; of a drawing the one into which it is translated"""
 
 
 def linkage_report(
@@ -360,7 +365,7 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
             yield b.Given(((title, sections),))
 
 
-LinkageOutcome = tuple[LinkageFindings, str, tuple[UnusualValue, ...], tuple[str, ...]]
+LinkageOutcome = tuple[LinkageFindings, str, tuple[UnusualValue, ...], tuple[str, ...], str]
 TASK: Task[LinkageQuestion, LinkageOutcome] = Task(
     "linkage",
     lambda question, folder, progress: (
@@ -368,9 +373,14 @@ TASK: Task[LinkageQuestion, LinkageOutcome] = Task(
         question.file,
         question.unusual,
         question.remarks,
+        question.text,
     ),
-    lambda outcome: linkage_report(*outcome),
-    files=PICTURES,
+    lambda outcome: linkage_report(*outcome[:-1]),
+    files=(*PICTURES, COPY),
+    writers=lambda outcome, report, folder, of_report: [
+        *of_report,
+        lambda: write_file(folder / COPY, outcome[-1]),
+    ],
     accept=no_check,
     sources=lambda question: (Path(question.file),),
     tells_remarks=True,
