@@ -46,6 +46,7 @@ KINDS = {
     "level_luffing_crane": ["RRR"],
     "pump_jack": ["RRR"],
     "punching_press": ["RRP"],
+    "rack_feeder": ["RRP", "rack and pinion"],
     "scissor_lift": ["cylinder", "RRP", "RRR", "RPR"],
     "scotch_yoke_pump": ["RPP"],
     "slider_crank_press": ["RRP"],
@@ -54,6 +55,7 @@ KINDS = {
     "straight_line_pump": ["geared link"],
     "tipper": ["cylinder"],
     "toggle_clamp": ["RRR"],
+    "valve_cam": ["cam follower"],
     "watt_six_bar": ["RRR", "RRR"],
     "whitworth_quick_return": ["RPR", "RRP"],
 }

@@ -44,7 +44,7 @@ from chainunit.study.window import Phase, Trip, Window
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LINKAGES = sorted((EXAMPLES / "linkages").glob("*.toml"))
-QUICK = ("chain_unit", "slider_crank_press", "scotch_yoke_pump", "toggle_clamp", "cylinder_lift")
+QUICK = ("chain_unit", "valve_cam", "slider_crank_press", "scotch_yoke_pump", "toggle_clamp", "cylinder_lift")
 pytestmark = node
 
 

@@ -316,8 +316,7 @@ def linkage_command(
     from ..study.study_file import toml_text
 
     drawn = imported(source, density, scale)
-    if drawn:
-        text = "".join(f"# {remark}\n" for remark in drawn.remarks) + toml_text(drawn.tables)
+    text = "".join(f"# {remark}\n" for remark in drawn.remarks) + toml_text(drawn.tables) if drawn else ""
     if to is not None:
         if drawn is None or to.suffix != ".toml" or Path(source).resolve() == to.resolve():
             raise InputError(
@@ -327,11 +326,8 @@ def linkage_command(
         print(f"{to}: the linkage file; {', '.join(drawn.remarks)}")
         linkage_in(to)
         return
-    if drawn:
-        model, unusual = drawn.machine()
-    else:
-        model, unusual = linkage_in(Path(source))
-        text = file_text(Path(source), TOML)
+    model, unusual = drawn.machine() if drawn else linkage_in(Path(source))
+    text = text or file_text(Path(source), TOML)
     show_slips(unusual)
     machine, remarks = Machine(model), drawn.remarks if drawn else ()
     name = drawn.name if drawn else source

@@ -75,8 +75,6 @@ def linkage(
     for value in slips_of(unusual):
         warnings.warn(value.sentence, RemarkWarning, stacklevel=2)
     machine = Machine(model)
-    text = file_text(Path(file), TOML)
-    question = LinkageQuestion(
-        machine, speed_of_driver(machine, speed, "speed"), str(file), unusual, text=text
-    )
+    speed, text = speed_of_driver(machine, speed, "speed"), file_text(Path(file), TOML)
+    question = LinkageQuestion(machine, speed, str(file), unusual, text=text)
     return LinkageResult.made(question, folder, progress)

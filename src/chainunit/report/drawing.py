@@ -180,9 +180,10 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
         canvas.outline("polygon", map(to_page, outline), **_DASHED)
     if isinstance(crank, Crank):
         bearing = page_points[crank.bar.pin]
-        # a link with its bearing alone, such as a drum or a fan, is a disc of any size
-        radius = math.dist(bearing, page_points[crank.end]) or _DISC
-        if machine.model.turns:
+        # a link with its bearing alone, such as a drum or a fan, is a disc of any size; a cam has its profile
+        length, outlined = math.dist(bearing, page_points[crank.end]), whole.linkage.outlines.values()
+        radius = length or _DISC
+        if machine.model.turns and (length or all(outline.pin != crank.bar.pin for outline in outlined)):
             _circle(canvas, bearing, radius)
         else:
             canvas.outline("polyline", map(to_page, course), **_DASHED)

@@ -365,22 +365,13 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
             yield b.Given(((title, sections),))
 
 
-LinkageOutcome = tuple[LinkageFindings, str, tuple[UnusualValue, ...], tuple[str, ...], str]
+LinkageOutcome = tuple[LinkageFindings, LinkageQuestion]
 TASK: Task[LinkageQuestion, LinkageOutcome] = Task(
     "linkage",
-    lambda question, folder, progress: (
-        linkage_findings(question.machine, question.speed),
-        question.file,
-        question.unusual,
-        question.remarks,
-        question.text,
-    ),
-    lambda outcome: linkage_report(*outcome[:-1]),
+    lambda question, folder, progress: (linkage_findings(question.machine, question.speed), question),
+    lambda outcome: linkage_report(outcome[0], outcome[1].file, outcome[1].unusual, outcome[1].remarks),
     files=(*PICTURES, COPY),
-    writers=lambda outcome, report, folder, of_report: [
-        *of_report,
-        lambda: write_file(folder / COPY, outcome[-1]),
-    ],
+    writers=lambda outcome, _, folder, other: [*other, lambda: write_file(folder / COPY, outcome[1].text)],
     accept=no_check,
     sources=lambda question: (Path(question.file),),
     tells_remarks=True,

@@ -33,10 +33,8 @@ def at_rest(f: LinkageFindings, x: LinkageAtRest, file: str) -> Iterator[b.Block
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
     if bool(np.all(np.abs(equilibria.rest.holding) <= equilibria.rest.friction)):
-        text = (
-            "At rest the machine stays wherever it is: friction of the joints holds more, at most {}, than "
-        )
-        text += f"the holding {effort}, at most {{}}."
+        text = "At rest the machine stays wherever it is: friction of the joints holds more, at most {}, than the "
+        text += f"holding {effort}, at most {{}}."
         yield b.Text(filled(text, number(x.summary.friction), number(x.summary.peak)))
         return
     yield b.Text(

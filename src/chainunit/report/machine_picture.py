@@ -24,7 +24,9 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
     """The parts of the picture of a machine that no run changes; `way` is its mechanism over the whole way of its
     driver."""
     driver, turns = way.linkage.driver, machine.model.turns
-    circles = [(driver.bar.pin, driver.end)] * (turns and isinstance(driver, Crank))
+    circles = [(driver.bar.pin, driver.end)] * (
+        turns and isinstance(driver, Crank) and driver.bar.pin != driver.end
+    )
     return Animation(
         tuple(linkage.links(way.linkage)),
         linkage.supports(way.linkage),
