@@ -206,9 +206,8 @@ def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
         for a number that is not whole, below 2, or above 10000.
     """
     whole = type(number) is not bool and isinstance(number, int | np.integer)
-    if not (whole and len(parts) <= number <= _MOST_RODS):
-        allowed = f"a whole number >= {len(parts)} and <= {_MOST_RODS}"
-        raise InputError(f"number of rods = {shown(number)}: must be {allowed}")
+    if not whole or not len(parts) <= number <= _MOST_RODS:
+        raise InputError(f"number of rods = {shown(number)}: must be a whole number >= 2 and <= {_MOST_RODS}")
     first, second = parts
     most = number - 1
     share = round(number * first / (first + second))

@@ -94,12 +94,12 @@ def decompose(
         raise _freedoms(unknown, joints, matched, free)
     groups, placed = [], {GROUND, *grounded.values()}
     for part in _strong_parts(_dependences(unknown, joints, matched)):
-        groups.append(_classified(tuple(part), joints, placed, first))
+        groups.append(_classified(tuple(part), joints, placed))
         placed |= {*part}
     leading = [group for group in groups if group.joints[-1].name == first]
     for group in leading:
         if group.kind == DRIVER or not all(GROUND in joint.links for joint in group.joints[:3:2]):
-            raise _unpinned(group.joints[-1], first)
+            raise _unpinned(group.joints[-1], "of the ground")
     return [*leading, *alone, *(group for group in groups if group not in leading)]
 
 
@@ -259,9 +259,8 @@ def _strong_parts(depends: Mapping[str, Mapping[str, None]]) -> Iterator[list[st
             yield from visit(link)
 
 
-def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[str], first: str) -> AssurGroup:
-    """A group on links that are `placed`, with its links and joints in their roles; `first` is the joint of the first
-    driver.
+def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[str]) -> AssurGroup:
+    """A group on links that are `placed`, with its links and joints in their roles.
 
     Raises
     ------
@@ -279,7 +278,7 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
         if pair[1].alone and pair[0].kind in pair[1].seats:
             return AssurGroup(pair[1].alone, part, tuple(pair))
     if drive := next((j for j in joints if j.equations == _DRIVEN), None):
-        return _driven(drive, part, [j for j in inner if j is not drive], outer, first)
+        return _driven(drive, part, [j for j in inner if j is not drive], outer)
     plain = all(joint.kind in _LETTERS for joint in joints)
     singly = all(len(link_joints) == 1 for link_joints in outer.values())
     if plain and singly and len(part) == 2 and len(inner) == 1:
@@ -312,14 +311,10 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
 
 
 def _driven(
-    drive: JointOf,
-    part: Sequence[str],
-    inner: Sequence[JointOf],
-    outer: Mapping[str, Sequence[JointOf]],
-    first: str,
+    drive: JointOf, part: Sequence[str], inner: Sequence[JointOf], outer: Mapping[str, Sequence[JointOf]]
 ) -> AssurGroup:
     """The group of a link that a driver turns on one before it, or of two links that it moves against each other,
-    with their lever; `first` is the joint of the first driver.
+    with their lever.
 
     Raises
     ------
@@ -336,21 +331,23 @@ def _driven(
         if not outer[far] and [joint.kind for joint in ends] == [REVOLUTE] * 3:
             kind = ELBOW if drive.kind == REVOLUTE else CYLINDER
             return AssurGroup(kind, (near, far, lever), (*ends, drive))
-    raise _unpinned(drive, first, [*inner, *(joint for link in part for joint in outer[link])])
+    others = [*inner, *(joint for link in part for joint in outer[link])]
+    special = next((joint for joint in others if joint.kind not in _LETTERS), None)
+    raise _unpinned(drive, "of the ground or of a link that is moved before it", special)
 
 
-def _unpinned(drive: JointOf, first: str, others: Sequence[JointOf] = ()) -> InputError:
-    """The refusal of two links that a driver moves against each other, if their outer pins are not where they must
-    be; `others` are the further joints of their group."""
-    leads, special = drive.name == first, [joint for joint in others if joint.kind not in _LETTERS]
-    place = "of the ground" if leads else "of the ground or of a link that is moved before it"
-    moves, machine = ("against", "two arms") if drive.kind == REVOLUTE else ("along", "a cylinder")
-    hint = ""
-    if special:
-        hint = f"; the {special[0].kind} {special[0].name} must be on a link that no driver moves against another one"
-    elif leads and drive.kind == REVOLUTE:
+def _unpinned(drive: JointOf, place: str, special: JointOf | None = None) -> InputError:
+    """The refusal of two links that a driver moves against each other, if their outer pins are not at that place, or
+    their group has a `special` joint."""
+    moves, machine, hint = "along", "a cylinder", ""
+    if drive.kind == REVOLUTE:
+        moves, machine = "against", "two arms"
         hint = (
             "; a motor on a link that another driver moves is no [driver] but [drivers.NAME] beside that one"
+        )
+    if special is not None:
+        hint = (
+            f"; the {special.kind} {special.name} must be on a link that no driver moves against another one"
         )
     return InputError(
         f"the links {drive.by} and {drive.on}, which the driver {drive.name} moves {moves} each other, must be "
