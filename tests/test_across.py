@@ -19,6 +19,7 @@ from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import linkage_from
 from chainunit.machines.machine import Machine
 from chainunit.report.drawing import drawing
+from chainunit.report.reference import keys_of
 from chainunit.study.config import parse
 from chainunit.study.package import model_and_start
 
@@ -336,7 +337,7 @@ def test_an_event_brings_the_place_of_its_load():
     [
         (
             '[[event]]\ntype = "jam"\nside = "left"\nacross = 0.5\n',
-            "across = 0.5: is of rockers a width apart",
+            "across = 0.5: .* rockers that stand a width apart; give machine.width",
         ),
         ("[feed]\nleft.across = 0.5\n", r"feed\.left\.across: unknown key.*give machine\.width"),
         ('organ = "chain"\n[machine]\nwidth = "1 m"\n', r"machine\.width: is of organs with two bars"),
@@ -397,6 +398,14 @@ def test_a_study_shows_the_corner_that_a_lump_overloads(tmp_path):
         ("pins.A3.friction = 0.1", ["machine.pins.A3: is no pin of this machine"]),
         ("pins = 'rolling'", ['machine.pins = "rolling": must be a table of pins']),
         (
+            "pins.A.frction = 0.1",
+            ['machine.pins.A.frction: unknown key; was "friction" meant? a pin has friction'],
+        ),
+        (
+            "pins.A = { kind = 'rolling', friction = 0.1 }",
+            ["machine.pins.A.kind: is rolling, with the friction 0.0015"],
+        ),
+        (
             "pins = { A = { kind = 'soft' }, Q = {} }",
             ["machine.pins.A.kind: is", "machine.pins.Q: is no pin"],
         ),
@@ -419,7 +428,25 @@ def test_a_wrong_place_or_pin_is_refused_once(text, refusals):
     lines = str(refused.value).splitlines()
     assert len(lines) == len(refusals)
     for line, refusal in zip(lines, refusals, strict=True):
-        assert line.startswith(refusal) and ("give machine.width" in line) == ("unknown key" in line)
+        assert line.startswith(refusal) and ("give machine.width" in line) == (".across: unknown key" in line)
+
+
+def test_an_empty_table_of_pins_changes_nothing():
+    assert parse("[machine.pins]\n").machine.by_name == parse("").machine.by_name
+
+
+def test_a_pin_has_no_kind_in_python():
+    with pytest.raises(
+        InputError, match=r"^pins\.O1\.kind: unknown key; .*a rolling one has friction = 0\.0015$"
+    ):
+        Machine(ChamberForces, {"pins.O1.kind": "rolling"})
+
+
+def test_the_keys_of_one_pin_are_found():
+    (table, *_) = keys_of("machine.pins.O1").opening
+    assert [row.cells[0] for row in table.rows] == [
+        f"pins.NAME.{key}" for key in ("friction", "diameter", "w_smooth", "damping", "kind")
+    ]
 
 
 def test_a_limit_of_0_has_no_digits_of_the_search():

@@ -242,6 +242,7 @@ def test_the_report(name, words):
     assert findings.turn.energy_gap < 1e-12
     assert words.count("(") == len(data.groups)
     assert drawing(machine).count("<polygon") + drawing(machine).count("<polyline") >= 3
+    assert drawing(machine).count('r="13.00"') == (name in DRIVEN)  # the ring of a motor in a pin
 
 
 BRANCHES = {
@@ -374,6 +375,14 @@ def test_refusals_of_drivers_between_links():
         ("[loads.push]", slide),
     )
     assert "links.fore: " in text and "more than once" in text
+    cam = (
+        '[parameters]\nbase = "0.1 m"\n[ground]\nO = [0, 0]\nQ = [0.5, 0]\n[driver]\nlink = "shaft"\n[drivers.m]\n'
+        'joint = "B"\nphi = "90 deg"\n[links.shaft]\npoints = { O = [0, 0] }\n[links.one]\npoints = { Q = [0, 0], '
+        'B = [0.2, 0] }\n[links.two]\npoints = { B = [0, 0], F = [0.3, 0] }\n[joints.track]\non = "two.F"\nby = '
+        '"shaft.O"\nradius = "base"\nroller = 0.01\n[start]\npoints = { B = [0.4, 0.2], F = [0.1, 0.1] }\n'
+    )
+    text = refused(cam)
+    assert text.endswith("the cam track must be on a link that no driver moves against another one")
 
 
 @pytest.mark.parametrize(

@@ -159,3 +159,48 @@ def test_the_mill_gets_the_motor_that_its_example_names(tmp_path):
         text = text.replace(f"{line}\n", "", 1)
     result, _ = study_of("mill", tmp_path, f'{text}\n[sizing]\ngear_kind = "none"\ncandidates = 3\n')
     assert "IE3 4-pole 15 kW, 160L" in result["sentence"]
+
+
+def test_a_valve_lifts_off_its_cam_at_the_speed_of_the_calculation_by_hand():
+    """A rise of 70 deg by the 3-4-5 polynomial. Where its second derivative is below 0, the spring of 180 N and
+    18 N/mm and the weight of 140 g hold the valve; the contact along the line of its guide is what they have left."""
+    machine = Machine(read_linkage(EXAMPLES / "linkages" / "valve_cam.toml"))
+    x, rise = np.linspace(0.0, 1.0, 100001), math.radians(70.0)
+    lift = 8e-3 * (10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5)
+    slope = 8e-3 * 30.0 * x**2 * (1.0 - x) ** 2 / rise
+    bend = 8e-3 * (60.0 * x - 180.0 * x**2 + 120.0 * x**3) / rise**2
+    holding = 180.0 + 18e3 * lift + 0.14 * 9.81
+    behind = bend < 0.0
+    lifting = math.sqrt(np.min(holding[behind] / (-0.14 * bend[behind])))
+    assert lifting * 30.0 / math.pi == pytest.approx(2575.1, abs=0.1)
+    # the camshaft counts from its base circle; the rise begins at -70 deg, where the cam is at 110 deg of its profile
+    phi = -rise * (1.0 - x)
+    for speed, words in ((188.4956, 163.4), (lifting, 0.0)):
+        normal = machine.outputs(phi, speed).cam.normal
+        by_hand = (holding + 0.14 * bend * speed**2) * np.hypot(1.0, slope / (24e-3 + lift))
+        assert np.max(np.abs(np.abs(normal) - np.abs(by_hand))) < 1e-9 * np.max(normal)
+        assert np.min(normal) == pytest.approx(words, abs=0.05)
+
+
+def test_a_rack_feeds_what_the_calculation_by_hand_says():
+    """The rack goes 2 r to the left; the roll of 80 mm on the shaft of the pinion of 50 mm pulls the strip."""
+    machine = Machine(read_linkage(EXAMPLES / "linkages" / "rack_feeder.toml"))
+    r, l, w = 0.06, 0.4, 2.0 * math.pi
+    phi = PHI[(PHI > 0.1) & (PHI < 3.0)]
+
+    def rate(angle):
+        long = np.sqrt(l * l - (r * np.sin(angle)) ** 2)
+        return -r * np.sin(angle) - r * r * np.sin(angle) * np.cos(angle) / long
+
+    out = machine.outputs(PHI, w)
+    assert np.ptp(out.gear.angle) == pytest.approx(2.0 * r / 0.05, rel=1e-12)
+    assert 0.08 * np.ptp(out.gear.angle) == pytest.approx(0.192, rel=1e-12)
+    forth = machine.outputs(phi, w)
+    assert forth.rack.B.vx == pytest.approx(rate(phi) * w, rel=1e-12) and np.all(rate(phi) < 0.0)
+    # the teeth drive the strip, and 0.05 kg m2 with the acceleration of the rack, by a complex step
+    bend = rate(phi + 1e-30j).imag / 1e-30 * w * w
+    assert np.abs(forth.teeth.fx) == pytest.approx((1500.0 * 0.08 - 0.05 * bend / 0.05) / 0.05, rel=1e-12)
+    # without friction the eccentric gives the work of the strip alone
+    free = machine.replace({"pins.friction": 0.0, "guides.friction": 0.0}).outputs(PHI, w)
+    assert np.mean(free.tau) * 2.0 * math.pi == pytest.approx(1500.0 * 0.192, rel=2e-3)
+    assert np.max(out.tau) == pytest.approx(160.2, abs=0.1)

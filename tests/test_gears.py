@@ -650,3 +650,24 @@ def test_a_rack_moves_as_far_as_the_pitch_circle():
     assert Machine(swung).outputs(2.8, 0.0).margin > 0.0
     with pytest.raises(InputError, match="may swing by less than 168 deg"):
         machine_of(description_of(data | {"driver": {"link": "pinion"}}, "round"))
+
+
+@pytest.mark.parametrize("pitch_radius", [1e-12, 0.0, -0.05])
+def test_the_pitch_line_stays_on_its_side_of_the_pinion(pitch_radius):
+    data = {
+        "parameters": {"h": 0.05},
+        "ground": {"O1": [0, 0], "G": [-1, "h"], "G2": [1, "h"]},
+        "driver": {"link": "pinion", "range": [-1.2, 1.2]},
+        "links": {"pinion": link(1.0, O1=[0, 0]), "rack": link(2.0, T=[0, 0], R=[0.1, 0.0])},
+        "joints": {
+            "guide": {"on": "rack.R", "by": "ground.G", "toward": "G2"},
+            "mesh": {"type": "rack", "on": "rack.T", "by": "pinion.O1"},
+        },
+        "start": {"points": {"T": [0.2, 0.05]}},
+    }
+    machine = Machine(machine_of(description_of(data, "rack")), h=0.03)
+    assert machine.outputs(1.0).rack.T.x == pytest.approx(0.2 - 0.03, abs=1e-15)
+    with pytest.raises(
+        InputError, match=r"to the other side of its centre|with h = -0\.05; must be > 0\.001"
+    ):
+        machine.replace(h=pitch_radius)

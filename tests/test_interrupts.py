@@ -119,7 +119,9 @@ def test_an_interrupt_while_files_are_written_names_those_that_are_there(happens
     done = chainunit("linkage", PRESS, "-o", "out", cwd=tmp_path)
     there = ["linkage.json"]
     there += [f"linkage{name}" for name in (".svg", ".png", "_stroke.png", "_reactions.png", "_rest.png")]
-    there += ["linkage.md", "report.html", "provenance.json"] if happens is _swallowed else []
+    there += (
+        ["linkage.md", "report.html", "linkage_copy.toml", "provenance.json"] if happens is _swallowed else []
+    )
     assert done.returncode == 130
     assert done.stderr == f"chainunit: interrupted; written: {', '.join(f'out/{name}' for name in there)}\n"
     assert sorted(p.name for p in (tmp_path / "out").iterdir() if p.suffix) == sorted(there)

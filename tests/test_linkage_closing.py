@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from between_links import FIVE_BAR
 
 from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of
@@ -154,3 +155,71 @@ def test_guides_that_become_parallel_are_a_dead_position():
     }
     with pytest.raises(InputError, match="its two guides are parallel, so that its forces have no limit"):
         machine_of(description_of(data, "parallel"))
+
+
+def test_an_elbow_that_does_not_close_is_told_with_gap_and_lever():
+    """The arms B-C and C-D with the law of their motor are one side of the triangle B-D-E: the limits of the lever
+    follow from |B-E| and from the reach of the arms."""
+    law = 'phi = "0.3 * sin(phi) + 110 deg"\nby = "motor"'
+
+    def with_lever(length):
+        return machine(FIVE_BAR.format(law=law).replace("D = [0.6, 0]", f"D = [{length}, 0]"))
+
+    with pytest.raises(
+        InputError, match=r"pins B and E are 1000 mm apart, right is 100 mm long, its arms reach over 1230 mm"
+    ) as caught:
+        with_lever(0.1)
+    q = np.linspace(0.0, 2.0 * math.pi, 721)
+    # the frame of the second arm starts at D
+    reach = np.abs(0.8 - 0.7 * np.exp(1j * (0.3 * np.sin(q) + math.radians(110.0))))
+    apart = np.abs(1.2 - 0.2 * np.exp(1j * q))
+    told = re.search(r"length of right between (\S+) mm and (\S+) mm closes it", str(caught.value)).groups()
+    low, high = (1e-3 * float(x) for x in told)
+    assert low == pytest.approx(np.max(np.abs(reach - apart)), abs=1e-3)
+    assert high == pytest.approx(np.min(reach + apart), abs=2e-3)
+    for length in (low + 0.02, high - 0.02):
+        with_lever(length)
+
+
+def test_a_cylinder_that_does_not_close_is_told_with_its_ways():
+    """The pins of the cylinder and of its lever are 500 mm apart, the lever is 2 m long: the cylinder is between 1.5
+    and 2.5 m long, of which 0.1 m are beside its way."""
+    text = """
+[ground]
+A = [0, 0]
+B = [0.4, -0.3]
+[driver]
+joint = "ram"
+range = [{}]
+[links.boom]
+points = {{ A = [0, 0], C = [2, 0] }}
+mass = 900
+[links.barrel]
+points = {{ B = [0, 0], b = [1, 0] }}
+[links.rod]
+points = {{ C = [0, 0], R = [-0.1, 0] }}
+[joints.ram]
+on = "rod.R"
+by = "barrel.B"
+toward = "b"
+angle = 0
+[start]
+phi = 1.7
+angles = {{ boom = "20 deg", barrel = "35 deg", rod = "35 deg" }}
+"""
+    words = r"pins B and A are 500 mm apart, boom is 2000 mm long: it closes at a way from 1\.4 m to 2\.4 m;"
+    for span in ("1.0, 2.0", "1.6, 2.5"):
+        with pytest.raises(InputError, match=words):
+            machine(text.format(span))
+    machine(text.format("1.45, 2.35"))
+
+
+def test_a_guide_without_its_line_and_a_unit_in_an_expression_are_told_as_such():
+    with pytest.raises(
+        InputError, match="ram has two pins in its point B; if one of both joints is a guide, give it"
+    ):
+        machine(SLIDER.replace('toward = "G2"\n', ""))
+    with pytest.raises(
+        InputError, match="no number with a unit and no expression: no unit stands in one, take a par"
+    ):
+        machine(FOUR_BAR.replace('["l", 0]', '["l + 3 mm", 0]'))

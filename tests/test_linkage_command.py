@@ -94,6 +94,7 @@ def test_show(tmp_path):
     assert {"linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png", "linkage.md"} <= {
         each.name for each in (tmp_path / "out").iterdir()
     }
+    assert (tmp_path / "out" / "linkage_copy.toml").read_text("utf-8") == PRESS.read_text("utf-8")
 
 
 @pytest.mark.second

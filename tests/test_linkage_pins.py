@@ -108,6 +108,10 @@ def test_start_values_follow_the_table_and_the_kind():
     [
         ({"pins": {"X": SEAT}}, "pins.X: is no pin of this linkage; its pins are O1, O3, O4, A, T1, T2, D"),
         ({"pins": {"A": {"kind": "ball"}}}, 'pins.A.kind: is "ball"; must be plain or rolling'),
+        (
+            {"pins": {"A": {**ROLLING, "friction": 0.1}}},
+            "pins.A.kind: is rolling, with the friction 0.0015; take",
+        ),
         ({"pins": {"A": {"frction": 0.1}}}, "pins.A.frction: unknown key; was .friction. meant"),
         ({"pins": {"A": {"friction": -0.1}}}, "pins.A.friction: is -0.1; must be >= 0"),
         ({"guides": {"A": {"friction": 0.1}}}, "guides.A: is no guide"),

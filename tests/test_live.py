@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from between_links import EXCITER
 from javascript_hosts import node
 from live_pages import OUTCOME, in_node, live_of
 from reports import report_of
@@ -19,7 +21,8 @@ from chainunit import InputError
 from chainunit.app.cli import live as live_command
 from chainunit.core.quantities import Layout
 from chainunit.machines.admissible import admits, holding_range
-from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.api import ChainUnitMachine
+from chainunit.machines.linkages.file import linkage_from, read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.report import html
 from chainunit.report.live.formulas import event_signals, varied_names
@@ -41,7 +44,7 @@ from chainunit.study.window import Phase, Trip, Window
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LINKAGES = sorted((EXAMPLES / "linkages").glob("*.toml"))
-QUICK = ("chain_unit", "slider_crank_press", "scotch_yoke_pump", "toggle_clamp", "cylinder_lift")
+QUICK = ("chain_unit", "valve_cam", "slider_crank_press", "scotch_yoke_pump", "toggle_clamp", "cylinder_lift")
 pytestmark = node
 
 
@@ -114,6 +117,20 @@ def test_a_turn_of_each_linkage_is_that_of_python(file):
     speed = 0.1 if machine.model.slides else 5.0
     live = of_linkage(machine, speed, file.name)
     check_turn(live, machine, speed, machine.model.Feed(), varied(live, 4, 1))
+
+
+@pytest.mark.parametrize(("machine", "efforts", "arrows"), [
+    (Machine(linkage_from(tomllib.loads(EXCITER), "exciter")[0]), ["exciter.tau"], 5),
+    (ChainUnitMachine({"width": 1.5, "bar.diameter": 0.09}), ["bar.torsion", "bar.bending", "bar.stress"], 10),
+])  # fmt: skip
+def test_a_turn_has_further_efforts_and_an_arrow_for_each_pin(machine, efforts, arrows):
+    """The motor in a pin has its torque, the bar between two rockers its load; the share of a reaction has no arrow
+    of its own."""
+    live = of_linkage(machine, 5.0, "machine.toml")
+    check_turn(live, machine, 5.0, machine.model.Feed(), {})
+    turn = live.data["turn"]
+    assert [row["of"] for row in turn["results"] if row["of"].startswith(("exciter", "bar"))] == efforts
+    assert sum(force["at"] in turn["picture"]["joints"] for force in turn["forces"]) == arrows
 
 
 def test_the_most_effective_numbers_come_first(packaged):

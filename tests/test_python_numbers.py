@@ -324,6 +324,10 @@ def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, 
             "number of rods = 1: must be a whole number >= 2",
         ),
         (
+            lambda: ChainUnitMachine().organ_rods("left", number=10**30),
+            "number of rods = 1000000000000000000000000000000: must be a whole number >= 2 and <= 10000",
+        ),
+        (
             lambda: ChainUnitOfChains(number=2.5).simulated,
             "number of rods = 2.5: must be a whole number >= 2",
         ),

@@ -308,6 +308,7 @@ def linkage_command(
     Writes report.html, linkage.json, linkage.md and pictures into the output folder.
     """
     from ..core.files import write_file
+    from ..core.inputs import TOML, file_text
     from ..machines.linkages.file import linkage_in
     from ..machines.linkages.imports.source import imported
     from ..machines.machine import Machine
@@ -316,21 +317,22 @@ def linkage_command(
     from ..study.study_file import toml_text
 
     drawn = imported(source, density, scale)
+    text = "".join(f"# {remark}\n" for remark in drawn.remarks) + toml_text(drawn.tables) if drawn else ""
     if to is not None:
         if drawn is None or to.suffix != ".toml" or Path(source).resolve() == to.resolve():
             raise InputError(
                 f"--to {to}: writes a drawing of another program as a linkage file, such as machine.toml"
             )
-        comments = "".join(f"# {remark}\n" for remark in drawn.remarks)
-        write_file(to, comments + toml_text(drawn.tables))
+        write_file(to, text)
         print(f"{to}: the linkage file; {', '.join(drawn.remarks)}")
         linkage_in(to)
         return
     model, unusual = drawn.machine() if drawn else linkage_in(Path(source))
+    text = text or file_text(Path(source), TOML)
     show_slips(unusual)
     machine, remarks = Machine(model), drawn.remarks if drawn else ()
     name = drawn.name if drawn else source
-    question = LinkageQuestion(machine, speed_of_driver(machine, speed), name, unusual, remarks)
+    question = LinkageQuestion(machine, speed_of_driver(machine, speed), name, unusual, remarks, text)
     carry_out(TASK, question, output, whole=whole, png=png)
 
 

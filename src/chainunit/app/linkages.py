@@ -9,6 +9,7 @@ from typing import Any
 
 from ..core.declared_numbers import as_text
 from ..core.errors import RemarkWarning, check_kind
+from ..core.inputs import TOML, file_text
 from ..machines.linkages.file import linkage_in
 from ..machines.machine import Machine
 from ..reading.tables import slips_of
@@ -74,5 +75,6 @@ def linkage(
     for value in slips_of(unusual):
         warnings.warn(value.sentence, RemarkWarning, stacklevel=2)
     machine = Machine(model)
-    question = LinkageQuestion(machine, speed_of_driver(machine, speed, "speed"), str(file), unusual)
+    speed, text = speed_of_driver(machine, speed, "speed"), file_text(Path(file), TOML)
+    question = LinkageQuestion(machine, speed, str(file), unusual, text=text)
     return LinkageResult.made(question, folder, progress)

@@ -1,7 +1,8 @@
 """A cam and its follower: a link on a pin or a rail, with a roller or a flat face on a profile of a link before it.
 
 The profile is a radius over the angle about its centre; the centre of a roller runs on its pitch curve. The angle at
-which the follower lies on it is followed once around, as the pose of a triad; the rest is closed form.
+which the follower lies on it is followed once around, as the pose of a triad, or over the range of the driver; the
+rest is closed form.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..core.planar import ZERO, Link, Vec2, mirrored, rotated
 from .body import Bar
 from .group import Group, Outline, SolvedGroup
 from .joints import Contact, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Placed, Rail
-from .series import series_of, values_of
+from .series import even_value_of, series_of, values_of
 
 SAMPLES, HARMONICS = 48, 16
 """Places of the driver at which a follower is followed once around, and the order of the series."""
@@ -63,8 +64,9 @@ class CamFollower(Group):
     of its face, that of one on a rail starts at `pin`. `cam` is the centre of the profile, the pin `centre`, with its
     angle 0; `curve` the radius over the angle; `roller` that of the roller, with which the profile `grows` to the
     pitch curve; `face` the normal of a face, away from the cam. `guide` is the pin of the force of the rail. The
-    angle of the contact, from the pin of the follower or its rail, is `near` at the place `start` of the driver. The
-    margin is the cosine of the pressure angle, below 0 of an undercut profile."""
+    angle of the contact, from the pin of the follower or its rail, is `near` at the place `start` of the driver,
+    which turns all the way round, or goes to and fro about the middle of its `span` by half of it. The margin is the
+    cosine of the pressure angle, below 0 of an undercut profile."""
 
     bar: Bar
     pin: str
@@ -79,6 +81,7 @@ class CamFollower(Group):
     guide: str
     near: float
     start: float
+    span: tuple[float, float] | None = None
 
     derived_count: ClassVar[int] = 2 * HARMONICS + 1
     """The number of values that `derive` gives: the series of the angle of the contact."""
@@ -155,16 +158,26 @@ class CamFollower(Group):
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """See `derived_count`."""
-        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-        course = [self._found(xp, self._sight(before(self.start)), self.near, _FIRST)[0]]
-        for q in angles[1:]:
+        turn = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
+        places = angles = [self.start + angle for angle in turn]
+        if self.span is not None:
+            # to and fro within the range: the place is a cosine, and the series has no sines
+            (middle, half), first = self.span, (self.start - self.span[0]) / self.span[1]
+            angles = [math.acos(max(-1.0, min(1.0, first))) + angle for angle in turn]
+            places = [middle + half * math.cos(angle) for angle in angles]
+        course = [self._found(xp, self._sight(before(places[0])), self.near, _FIRST)[0]]
+        for q in places[1:]:
             near = 2.0 * course[-1] - course[max(len(course) - 2, 0)]
             course.append(self._found(xp, self._sight(before(q)), near, _FURTHER)[0])
         return series_of(course, angles, HARMONICS)
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The follower on the profile, near the angle that the series `derived` gives."""
-        sight, (near,) = self._sight(linkage), values_of(derived, 1, self.derived_count, xp.cos(q), xp.sin(q))
+        sight = self._sight(linkage)
+        if self.span is None:
+            (near,) = values_of(derived, 1, self.derived_count, xp.cos(q), xp.sin(q))
+        else:
+            near = even_value_of(derived, (q - self.span[0]) / self.span[1])
         _, spot = self._found(xp, sight, near, _LAST)
         gap, _, size, margin = self._gap(xp, sight, spot)
         miss, room = gap / (size * _MISFIT), spot.curvature

@@ -80,6 +80,10 @@ class Crank(Driver):
         return (HingeData(self.bar.pin, self.bar.name, None, self.on),)
 
     @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        return ((self.bar.pin, self.bar.pin),) if self.on else ()
+
+    @property
     def inertia(self) -> Any:
         """Inertia of the crank alone about its bearing [kg m2]."""
         return _inertia_about_start(self.bar.mass)
@@ -219,17 +223,25 @@ class Elbow(Driver):
         )
 
     @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        return ((self.joint, self.joint),)
+
+    @property
     def inertia(self) -> Any:
         """That of both arms in series: of the first one about P, of the second one about its centroid [kg m2]."""
         one, other = _inertia_about_start(self.bar.mass), 0.0 if self.arm.mass is None else self.arm.mass.I
         return one * other / (one + other + 1e-300)
 
+    def reach(self, xp: Any, angle: Any) -> tuple[Vec2, Vec2]:
+        """The direction of the second arm, and P-C [m], in the frame of the first one at this `angle` [rad]."""
+        turned = rotated(self.start, Vec2(xp.cos(angle), xp.sin(angle) * self.sense))
+        return turned, Vec2(self.bar.length, 0.0) + turned * self.arm.length
+
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The arms at the place `q` of the motor, which gives the length of the side P-C of a triangle."""
         p, o = linkage.pins[self.bar.pin], linkage.pins[self.lever.pin]
-        angle, rates = self.course_at(xp, q)
-        turned = rotated(self.start, Vec2(xp.cos(angle), xp.sin(angle) * self.sense))
-        reach, b = Vec2(self.bar.length, 0.0) + turned * self.arm.length, self.lever.length
+        (angle, rates), b = self.course_at(xp, q), self.lever.length
+        turned, reach = self.reach(xp, angle)
         square = reach.squared()
         e, r = meeting(xp, p.p, o.p, square, b * b, self.side)
         d = rotated(e, Vec2(reach.x, -reach.y)) * (1.0 / square)

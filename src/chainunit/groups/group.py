@@ -123,7 +123,8 @@ class Group:
 
     @property
     def circles(self) -> tuple[tuple[str, str], ...]:
-        """The circles that a picture of it shows, each by the pins at its centre and on its rim."""
+        """The circles that a picture of it shows, each by the pins at its centre and on its rim; one with the same
+        pin twice is a motor."""
         return ()
 
     @property

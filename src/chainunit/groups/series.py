@@ -26,3 +26,12 @@ def values_of(series: Sequence[Any], count: int, terms: int, cos: Any, sin: Any)
             sums[k] = sums[k] + series[k * terms + 2 * n - 1] * c + series[k * terms + 2 * n] * s
         c, s = c * cos - s * sin, s * cos + c * sin
     return sums
+
+
+def even_value_of(series: Sequence[Any], cos: Any) -> Any:
+    """The value of such a series without sines, a polynomial of the cosine of the angle (Clenshaw's recurrence)."""
+    one: Any = 0.0
+    other: Any = 0.0
+    for factor in reversed(series[1::2]):
+        one, other = factor + 2.0 * cos * one - other, one
+    return series[0] + cos * one - other

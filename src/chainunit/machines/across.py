@@ -30,6 +30,8 @@ ROWS = ("front", "back")
 """The rockers; the place 1 is at the first one."""
 PLACES: Mapping[str, str] = {"material_mass": "across", "processing_force": "force_across"}
 """By load of an organ, the name of its place across the width."""
+NO_WIDTH = "a load has a place across rockers that stand a width apart; give machine.width"
+"""The refusal of a place where a study has no width."""
 _PLACE = "place across: 0 middle, 1 front rocker, -1 back rocker"
 
 

@@ -27,10 +27,19 @@ def with_pins(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
     Raises
     ------
     InputError
-        for a pin that the machine does not have.
+        for a pin that the machine does not have, and a name that the law of a pin does not have.
     """
-    pins = sorted({name.split(".")[1] for name in names if name.startswith("pins.")})
+    named = sorted(name.split(".") for name in names if name.startswith("pins."))
+    pins = [*dict.fromkeys(pin for _, pin, *_ in named)]
+    laws = f"a pin has {', '.join(SHARED)}, and in a file kind; a rolling one has friction = {ROLLING_FRICTION:g}"
     faults = [
+        InputError(
+            f"pins.{pin}.{key}: unknown key{near_name(key, SHARED) or ';'} {laws}", f"pins.{pin}.{key}"
+        )
+        for _, pin, key, *_ in (entry for entry in named if len(entry) > 2)
+        if key not in SHARED
+    ]
+    faults += [
         InputError(
             f"pins.{pin}: is no pin of this machine{near_name(pin, machine.pin_names)}; its pins are "
             f"{', '.join(machine.pin_names)}",
@@ -71,14 +80,18 @@ def shared_by_law(machine: MachineModel) -> dict[str, str]:
     return {name: SHARED[name.rpartition(".")[2]] for name in laws if machine.pin_names}
 
 
-def friction_of(kind: Any) -> dict[str, float]:
-    """The usual friction of a kind of bearing, by its name in the law of a pin; empty for a plain one.
+def friction_of(entry: Mapping[str, Any]) -> dict[str, float]:
+    """The usual friction of the kind of bearing that the table of a pin names, by its name in the law of a pin; empty
+    for a plain one.
 
     Raises
     ------
     InputError
-        for another kind, without its key.
+        for another kind, and a rolling one beside a friction, without the key of the kind.
     """
+    kind = entry.get("kind", PLAIN)
     if kind not in (PLAIN, ROLLING):
         raise InputError(f"is {shown(kind)}; must be {PLAIN} or {ROLLING}")
+    if kind == ROLLING and "friction" in entry:
+        raise InputError(f"is {ROLLING}, with the friction {ROLLING_FRICTION:g}; take kind or friction out")
     return {"friction": ROLLING_FRICTION} if kind == ROLLING else {}

@@ -69,7 +69,7 @@ class Equilibrium:
     potential: Value = quantity(
         "J", "potential above its least one over the way; none where it does not close"
     )
-    friction: Value = quantity("N.m", "torque that friction of pins and guides holds there")
+    friction: Value = quantity("N.m", "torque that friction of the joints holds there")
 
     @property
     def stable(self) -> bool:
@@ -86,7 +86,7 @@ class Holding:
     peak: Value = quantity("N.m", "largest in size")
     peak_at: Value = quantity("rad", "at")
     work: Value = quantity("J", "work over the way")
-    friction: Value = quantity("N.m", "largest that friction of pins and guides holds")
+    friction: Value = quantity("N.m", "largest that friction of the joints holds")
 
 
 class Rest(NamedTuple):
@@ -238,7 +238,7 @@ def _size(state: MachineState, q: Any) -> float:
 
 
 def friction_torque(state: MachineState) -> Any:
-    """The torque that friction of pins and guides holds at the driver [N m], of the shape of the state: each slips
+    """The torque that friction of the joints holds at the driver [N m], of the shape of the state: each slips
     with its reaction at rest, which is without friction."""
     losses = [loss for loss in state.m.linkage.loads.values() if isinstance(loss, PinLosses | GuideLosses)]
     return sum(

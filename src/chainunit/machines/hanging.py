@@ -26,6 +26,8 @@ import numpy as np
 from ..core.errors import GeometryError, InputError, shown
 
 _POLISH = 30
+_MOST_RODS = 10_000
+"""Largest number of rods of an organ at rest, whose vibration has a matrix with its square."""
 
 
 @dataclass(frozen=True)
@@ -201,10 +203,11 @@ def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
     Raises
     ------
     InputError
-        for a number that is not whole, or below 2.
+        for a number that is not whole, below 2, or above 10000.
     """
-    if type(number) is bool or not isinstance(number, int | np.integer) or number < len(parts):
-        raise InputError(f"number of rods = {shown(number)}: must be a whole number >= {len(parts)}")
+    whole = type(number) is not bool and isinstance(number, int | np.integer)
+    if not whole or not len(parts) <= number <= _MOST_RODS:
+        raise InputError(f"number of rods = {shown(number)}: must be a whole number >= 2 and <= {_MOST_RODS}")
     first, second = parts
     most = number - 1
     share = round(number * first / (first + second))

@@ -331,16 +331,23 @@ def _driven(
         if not outer[far] and [joint.kind for joint in ends] == [REVOLUTE] * 3:
             kind = ELBOW if drive.kind == REVOLUTE else CYLINDER
             return AssurGroup(kind, (near, far, lever), (*ends, drive))
-    raise _unpinned(drive, "of the ground or of a link that is moved before it")
+    others = [*inner, *(joint for link in part for joint in outer[link])]
+    special = next((joint for joint in others if joint.kind not in _LETTERS), None)
+    raise _unpinned(drive, "of the ground or of a link that is moved before it", special)
 
 
-def _unpinned(drive: JointOf, place: str) -> InputError:
-    """The refusal of two links that a driver moves against each other, if their outer pins are not at that place."""
+def _unpinned(drive: JointOf, place: str, special: JointOf | None = None) -> InputError:
+    """The refusal of two links that a driver moves against each other, if their outer pins are not at that place, or
+    their group has a `special` joint."""
     moves, machine, hint = "along", "a cylinder", ""
     if drive.kind == REVOLUTE:
         moves, machine = "against", "two arms"
         hint = (
             "; a motor on a link that another driver moves is no [driver] but [drivers.NAME] beside that one"
+        )
+    if special is not None:
+        hint = (
+            f"; the {special.kind} {special.name} must be on a link that no driver moves against another one"
         )
     return InputError(
         f"the links {drive.by} and {drive.on}, which the driver {drive.name} moves {moves} each other, must be "

@@ -142,9 +142,9 @@ class Expression:
                 raise InputError(f"{shown(text)}: {_SWITCH}") from None
             if "nested" in str(error):
                 raise self._too_deep() from None
-            raise InputError(
-                f"{shown(text)} is no number with a unit and no expression, such as 2 * r + 0.01"
-            ) from None
+            united = re.search(r"\d [A-Za-z]", text)
+            hint = ": no unit stands in one, take a parameter" if united else ", such as 2 * r + 0.01"
+            raise InputError(f"{shown(text)} is no number with a unit and no expression{hint}") from None
         self.value, self.number = whole.value, whole.number
         self.names, self.extremes, self.tables = whole.names, whole.extremes, whole.tables
 

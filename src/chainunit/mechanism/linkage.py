@@ -100,8 +100,8 @@ class Linkage:
 
     @property
     def circles(self) -> tuple[tuple[str, str], ...]:
-        """The circles that a picture shows, each by the pins at its centre and on its rim."""
-        return tuple(circle for group in self.groups for circle in group.circles)
+        """The circles that a picture shows, see `Group.circles`."""
+        return tuple(circle for group in (self.driver, *self.groups) for circle in group.circles)
 
     @property
     def outlines(self) -> dict[str, Outline]:

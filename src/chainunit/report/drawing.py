@@ -171,14 +171,16 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     for rail in rails:
         _rail(canvas, *map(to_page, rail))
     for centre, rim in whole.linkage.circles:
-        _circle(canvas, page_points[centre], math.dist(page_points[centre], page_points[rim]))
+        if centre != rim:
+            _circle(canvas, page_points[centre], math.dist(page_points[centre], page_points[rim]))
     for outline in linkage.outlines(whole):
         canvas.outline("polygon", map(to_page, outline), **_DASHED)
     if isinstance(crank, Crank):
         bearing = page_points[crank.bar.pin]
-        # a link with its bearing alone, such as a drum or a fan, is a disc of any size
-        radius = math.dist(bearing, page_points[crank.end]) or _DISC
-        if machine.model.turns:
+        # a link with its bearing alone, such as a drum or a fan, is a disc of any size; a cam has its profile
+        length, outlined = math.dist(bearing, page_points[crank.end]), whole.linkage.outlines.values()
+        radius = length or _DISC
+        if machine.model.turns and (length or all(outline.pin != crank.bar.pin for outline in outlined)):
             _circle(canvas, bearing, radius)
         else:
             canvas.outline("polyline", map(to_page, course), **_DASHED)
@@ -196,6 +198,10 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
         }
         canvas.outline(tag, (page_points[joint] for joint in link.joints), **look, **fill)
     for name, (x, y) in page_points.items():
+        if (name, name) in whole.linkage.circles:
+            canvas.add(
+                "circle", cx=x, cy=y, r=13.0, fill="none", stroke="#c1440e", stroke_width=2.5
+            )  # a motor
         if any(name in link.joints for link in links):
             canvas.add("circle", cx=x, cy=y, r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2)
             canvas.label_boxes.append((x - 6, y - 6, x + 6, y + 6))

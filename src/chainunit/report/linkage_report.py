@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from ..core.files import write_file
 from ..machines.linkages.joint_kinds import KINDS
 from ..machines.machine import Machine
 from ..mechanism.machine import MachineState
@@ -28,6 +29,8 @@ from .task import Task, no_check
 PICTURES = (
     "linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png", "linkage_rest.png"
 )  # fmt: skip
+COPY = "linkage_copy.toml"
+"""Name of the copy of the linkage file in the folder of the result."""
 _PICTURES = 120
 """Pictures of a turn, or of the way there and back."""
 
@@ -43,6 +46,8 @@ class LinkageQuestion(NamedTuple):
     """values of the file that are of an unusual size"""
     remarks: tuple[str, ...] = ()
     """sentences on a linkage from a drawing of another program"""
+    text: str = ""
+    """the linkage file; of a drawing the one into which it is translated"""
 
 
 def linkage_report(
@@ -99,7 +104,7 @@ def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     yield from (b.Text(note, "note") for note in x.notes)
     yield b.Drawing(
         drawing(f.machine), "The linkage: its pins, links and dimensions", PICTURES[0],
-        "A pair of hatched lines is a guide in the ground; a box is a block.",
+        "A pair of hatched lines is a guide in the ground, a box a block, a ring a motor in a pin.",
     )  # fmt: skip
 
 
@@ -366,17 +371,13 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
             yield b.Given(((title, sections),))
 
 
-LinkageOutcome = tuple[LinkageFindings, str, tuple[UnusualValue, ...], tuple[str, ...]]
+LinkageOutcome = tuple[LinkageFindings, LinkageQuestion]
 TASK: Task[LinkageQuestion, LinkageOutcome] = Task(
     "linkage",
-    lambda question, folder, progress: (
-        linkage_findings(question.machine, question.speed),
-        question.file,
-        question.unusual,
-        question.remarks,
-    ),
-    lambda outcome: linkage_report(*outcome),
-    files=PICTURES,
+    lambda question, folder, progress: (linkage_findings(question.machine, question.speed), question),
+    lambda outcome: linkage_report(outcome[0], outcome[1].file, outcome[1].unusual, outcome[1].remarks),
+    files=(*PICTURES, COPY),
+    writers=lambda outcome, _, folder, other: [*other, lambda: write_file(folder / COPY, outcome[1].text)],
     accept=no_check,
     sources=lambda question: (Path(question.file),),
     tells_remarks=True,

@@ -33,8 +33,8 @@ def at_rest(f: LinkageFindings, x: LinkageAtRest, file: str) -> Iterator[b.Block
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
     if bool(np.all(np.abs(equilibria.rest.holding) <= equilibria.rest.friction)):
-        text = "At rest the machine stays wherever it is: friction of pins and guides holds more, at most {}, than "
-        text += f"the holding {effort}, at most {{}}."
+        text = "At rest the machine stays wherever it is: friction of the joints holds more, at most {}, than the "
+        text += f"holding {effort}, at most {{}}."
         yield b.Text(filled(text, number(x.summary.friction), number(x.summary.peak)))
         return
     yield b.Text(
@@ -116,7 +116,7 @@ def _notes(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Bloc
     if equilibria.summary.friction:
         yield b.Text(
             filled(
-                f"The holding {effort} is without friction. Where friction of pins and guides holds more, at most "
+                f"The holding {effort} is without friction. Where friction of the joints holds more, at most "
                 "{}, the machine stands still, too. The smoothed friction of the models is zero at rest and holds "
                 "nothing.",
                 number(x.summary.friction),

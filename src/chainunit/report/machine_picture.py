@@ -24,7 +24,8 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
     """The parts of the picture of a machine that no run changes; `way` is its mechanism over the whole way of its
     driver."""
     driver, turns = way.linkage.driver, machine.model.turns
-    circles = [(driver.bar.pin, driver.end)] if turns and isinstance(driver, Crank) else []
+    has_circle = turns and isinstance(driver, Crank) and driver.bar.pin != driver.end
+    circles = [(driver.bar.pin, driver.end)] if has_circle else []
     outlines = {}
     for name, outline in way.linkage.outlines.items():
         corners = outline.points()
@@ -57,12 +58,15 @@ def driver_axis(machine: Machine, low: float | None = None, high: float | None =
 
 def reactions(machine: Machine) -> Iterator[tuple[str, str, str, str]]:
     """Output, title, joint and name in the picture of each reaction. The name is the title in a linkage file, else
-    empty, for that of the joint."""
-    model = machine.model
+    empty, for that of the joint. The share of a reaction, whose arrow would cover that of the whole, has an empty
+    joint."""
+    model, wholes = machine.model, set()
     is_file = hasattr(model, "described_by")
     for title, output in model.pins.items():
         if output in model.joints:
-            yield output, title, model.joints[output][0], title if is_file else ""
+            joint = model.joints[output]
+            yield output, title, "" if joint in wholes else joint[0], title if is_file else ""
+            wholes.add(joint)
 
 
 def arrows(
@@ -71,10 +75,10 @@ def arrows(
     groups: Mapping[str, str] | None = None,
     hidden: Collection[str] = (),
 ) -> Iterator[Arrow]:
-    """An arrow for each reaction whose output is not `hidden`. `groups` gives the group of an output, `force`
+    """An arrow for each reaction, but shares and `hidden` outputs. `groups` gives the group of an output, `force`
     the components of its reaction [N]."""
     for output, title, joint, short in reactions(machine):
-        if output not in hidden:
+        if joint and output not in hidden:
             yield Arrow(title, joint, *force(output), short=short, group=(groups or {}).get(output, ""))
 
 

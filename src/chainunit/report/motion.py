@@ -81,7 +81,7 @@ class Animation:
     caption: Line = ()
     hanging: tuple[str, ...] = ()
     circles: tuple[tuple[str, str], ...] = ()
-    """circles, each by the joints at its centre and on its rim"""
+    """circles, each by the joints at its centre and on its rim; one with the same joint twice is a motor"""
     outlines: Mapping[str, Any] = field(default_factory=dict)
     """closed curves by name, each with its joint and its points from there [m]; `blocks` of a run have its angle"""
     groups: tuple[str, ...] = ()

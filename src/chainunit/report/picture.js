@@ -163,7 +163,7 @@ const machinePicture = (stage, motion, tables) => {
     frame = 0;
     fit();
     drawSupports();
-    parts.circles = motion.circles.map((ends) => [ends, drawn(stage, "circle", { class: "orbit" })]);
+    parts.circles = motion.circles.map((ends) => [ends, drawn(stage, "circle", { class: ends[0] === ends[1] ? "motor" : "orbit" })]);
     drawRails();
     drawMoving();
     buildTables();
@@ -259,7 +259,7 @@ const machinePicture = (stage, motion, tables) => {
     }
     for (const [ends, circle] of parts.circles) {
       const [[ox, oy], [px, py]] = ends.map(at);
-      for (const [name, value] of Object.entries({ cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) })) circle.setAttribute(name, value);
+      for (const [name, value] of Object.entries({ cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) || 15 })) circle.setAttribute(name, value);
     }
     for (const [name, block, joint] of parts.blocks) {
       const [x, y] = at(joint);

@@ -21,7 +21,7 @@ from ..models import MODELS
 from ..reading.results import documented, results_in
 from ..reading.text import number
 from ..study.analyses import all_analyses
-from ..study.keys import KeyTable, catalogue_columns, key_tables
+from ..study.keys import NAME, KeyTable, catalogue_columns, key_tables
 from ..study.remark import SEVERITIES
 from ..study.remarks import declared_remarks
 from .blocks import Block, Column, Report, Section, Table, TableRow, Text, heads
@@ -83,14 +83,23 @@ def keys_of(name: str) -> Report:
 
 def _with_key(name: str) -> Iterator[KeyTable]:
     """The tables that have a key of this name, or keys below it, cut down to these keys. The name may begin with that
-    of the table or of its type, as in run.crank_speed."""
+    of the table or of its type, as in run.crank_speed, and have any word where the key has `NAME`."""
     for table in key_tables():
         names = {name, *(name.removeprefix(f"{part}.") for part in (table.name, table.of) if part)}
         keys = tuple(
-            key for key in table.keys if any(f"{key.name}.".startswith(f"{prefix}.") for prefix in names)
+            key
+            for key in table.keys
+            if any(_begins(key.name.split("."), prefix.split(".")) for prefix in names)
         )
         if keys:
             yield dataclasses.replace(table, keys=keys)
+
+
+def _begins(key: list[str], words: list[str]) -> bool:
+    """Whether the parts of the name of a key begin with these words."""
+    return len(words) <= len(key) and all(
+        part in (word, NAME) for part, word in zip(key, words, strict=False)
+    )
 
 
 def _key_names() -> Iterator[str]:

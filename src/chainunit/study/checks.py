@@ -43,10 +43,6 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     if parts:
         faults.add(parts.faults)
         readable = without(data, parts.faults)
-        machine = readable.get("machine")
-        if isinstance(machine, Mapping) and machine.get("pins") == {}:
-            # all of its pins are refused
-            readable = {**readable, "machine": {key: x for key, x in machine.items() if key != "pins"}}
     places = {
         f"{table}.{key}": x
         for table, section in usable_parts.sections.items()
@@ -115,19 +111,22 @@ def plate_of(designation: str, files: Sequence[Path]) -> CatalogueMotor | None:
 
 
 def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:
-    """The tables of a file without the refused values; without any event if one of them is refused."""
+    """The tables of a file without the refused values, and without inner tables that have no others; without any
+    event if one of them is refused."""
     # tables on the way to a refused value are copied one by one: a refused value may be nested without end
     tables = dict(data)
     for key in map(_key, faults):
         names = key.split(".")
         if "event" in names:
             names = names[: names.index("event") + 1]
-        inner: Any = tables
+        above, name, inner = tables, "", tables
         while len(names) > 1 and isinstance(inner.get(names[0]), dict):
             name = names.pop(0)
             inner[name] = dict(inner[name])
-            inner = inner[name]
+            above, inner = inner, inner[name]
         inner.pop(names[0], None)
+        if above is not tables and not inner:
+            above.pop(name)
     return tables
 
 

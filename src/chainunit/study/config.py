@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
@@ -55,6 +55,7 @@ from .parts import (
     Parts,
     beside,
     catalogues_of,
+    entries,
     example,
     linkage_lines,
     motor_is_left,
@@ -332,7 +333,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(unusual_values(kinds, {"event": tables}))
-        given_names, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
+        given_names, names = _names(data, events), _names(whole, events)
         linkage, lines = linkage_lines(data, source)
         contents = FileContents(
             source,
@@ -489,16 +490,11 @@ def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     return choices
 
 
-def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "") -> Iterator[str]:
+def _names(data: Mapping[str, Any], events: Mapping[str, Event]) -> frozenset[str]:
     """Names of all values that a file gives, events by the names of their runs."""
-    for name, value in data.items():
-        if name == "event" and not prefix:
-            for run, table in zip(events, value, strict=True):
-                yield from _names(table, {}, f"event.{run}.")
-        elif isinstance(value, Mapping):
-            yield from _names(value, {}, f"{prefix}{name}.")
-        else:
-            yield prefix + name
+    if "event" in data:
+        data = {**data, "event": dict(zip(events, data["event"], strict=True))}
+    return frozenset(name for name, value in entries(data) if not isinstance(value, Mapping))
 
 
 def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str, float]) -> Machine:

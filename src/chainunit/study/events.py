@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from ..core.quantities import Value, declaration, quantity
 from ..drives.contactor import CONTACTOR_EDGE
-from ..machines.across import PLACES, middle_of, place
+from ..machines.across import NO_WIDTH, PLACES, middle_of, place
 from ..machines.chain_unit import SideName, other
 from ..reading.text import number
 from ..system.signals import Profile
@@ -82,7 +82,7 @@ class Jam(_Pulses):
         """A place across the width needs a machine with a width."""
         if not self.p.across or f"{self.side}.force_across" in normal:
             return ""
-        return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width"
+        return f"across = {self.p.across:g}: {NO_WIDTH}"
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The pulses of the force, and for a machine with a width those of its place: while the lump adds its force

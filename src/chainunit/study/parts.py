@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -163,7 +163,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     with faults.collected():
         machine, unusual = _machine_model(table, source)
     faults.refuse()
-    machine, wrong = _with_further(machine, _names(data, "machine"))
+    machine, wrong = _with_further(machine, [name for name, _ in entries(named_table(data, "machine"))])
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
@@ -181,14 +181,15 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(table in data for table in choosing_tables())
 
 
-def _names(data: Mapping[str, Any], table: str) -> list[str]:
-    """The names of all keys in a table of a file, of inner tables in full; none if there is no such table."""
-    names, tables = [], [("", data.get(table))]
-    for prefix, inner in tables:
-        if isinstance(inner, Mapping):
-            names += [prefix + name for name in inner]
-            tables += [(f"{prefix}{name}.", entry) for name, entry in inner.items()]
-    return names
+def entries(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The entries of a table and of all its inner tables, each by its full name."""
+    # not by recursion: a wrong file may be nested without end
+    tables = [("", data)]
+    for prefix, table in tables:
+        for name, value in table.items():
+            yield prefix + name, value
+            if isinstance(value, Mapping):
+                tables.append((f"{prefix}{name}.", value))
 
 
 def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:
@@ -282,21 +283,21 @@ def with_frictions(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Inp
     machine, faults = data.get("machine"), Faults()
     if not isinstance(machine, Mapping) or "pins" not in machine:
         return data, []
+    rest = {name: value for name, value in machine.items() if name != "pins"}
     if not isinstance(machine["pins"], Mapping):
         wrong = (
             f"machine.pins = {shown(machine['pins'])}: must be a table of pins, such as pins.A.friction = 0.1"
         )
-        parameters = {name: value for name, value in machine.items() if name != "pins"}
-        return {**data, "machine": parameters}, [InputError(wrong, "machine.pins")]
+        return {**data, "machine": rest}, [InputError(wrong, "machine.pins")]
     pins = dict(machine["pins"])
     for name, entry in pins.items():
         if isinstance(entry, Mapping) and "kind" in entry:
             friction: Mapping[str, float] = {}
             key = f"machine.pins.{name}.kind"
             with faults.collected(), refusal_prefix(f"{key}: ", key):
-                friction = friction_of(entry["kind"])
+                friction = friction_of(entry)
             pins[name] = {**friction, **{key: value for key, value in entry.items() if key != "kind"}}
-    return {**data, "machine": {**machine, "pins": pins}}, faults.errors
+    return {**data, "machine": {**rest, **({"pins": pins} if pins else {})}}, faults.errors
 
 
 @cache

@@ -465,7 +465,7 @@ def _on_backward_pull(study: StudyRecord) -> None:
     """Warn of a load that no angle of the crank holds without the motor, as the weight of goods on a conveyor that
     rises. A gear that loses as much as it passes on holds it."""
     setup = study.setup
-    if setup.drive.foreign_machine or setup.drive.gear_loss >= 1.0:
+    if setup.drive.foreign_machine or setup.drive.gear.loss >= 1.0:
         return
     turn = cycle(setup.config.machine, _BACKWARDS * setup.config.run.crank_speed, setup.config.feed)
     if (torque := float(np.min(turn.crank_torque))) > 0.0:

@@ -14,7 +14,7 @@ from ..drives.contactor import StarDelta
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
-from ..machines.across import PLACES
+from ..machines.across import NO_WIDTH, PLACES
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
@@ -305,9 +305,8 @@ def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
         "motor": motor.Parameters,
     }
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
-    no_width = "a load has a place across rockers that stand a width apart; give machine.width"
     if not machine.layers:
-        places["feed"] = {f"{side}.{place}": no_width for side in machine.sides for place in PLACES.values()}
+        places["feed"] = {f"{side}.{place}": NO_WIDTH for side in machine.sides for place in PLACES.values()}
     sections = {
         name: FileSection(declaration, places=places.get(name, {}))
         for name, declaration in declarations.items()

@@ -363,7 +363,7 @@ class Trial:
         times = "" if rating is None else ", times the service factor"
         checks["gear_start"] = Check(f"{title}{times}", factor * hardest, gear.start_limit, "N.m")
         title = f"rated torque of the motor at the gear{times}"
-        rated = self.motor.nameplate.torque * self.drive.ratio / (1.0 + self.drive.gear_loss)
+        rated = self.motor.nameplate.torque * self.drive.ratio / (1.0 + self.drive.gear.loss)
         checks["gear_service"] = Check(title, factor * rated, gear.torque_limit, "N.m")
         if rating is None:
             return checks

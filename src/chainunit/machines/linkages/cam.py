@@ -149,6 +149,7 @@ class CamKind(SingleLinkKind):
             Rail(None if cam == GROUND else cam, *zero), parts.pin(cam, centre),
             LawCourse(table["radius"], values, values["splines"]), roller, not table["pitch"],
             face and parts.frames[link].components(face), rail, guide, parts.sides[link], parts.structure.start,
+            parts.structure.span,
         )  # fmt: skip
 
     def dead(self, group: AssurGroup, where: str) -> str:

@@ -111,5 +111,7 @@ def length_faults(points: Places, joints: Entries, drivers: Collection[str]) -> 
             continue
         (one, _), (other, _) = those
         if math.dist(points[link][one], points[link][other]) == 0.0:
-            key = f"links.{link}.points"
-            yield key, f"{one} and {other} are in one place, so that {link} has no length; place them apart"
+            why = f"{one} and {other} are in one place, so that {link} has no length; place them apart"
+            if one == other:
+                why = f"{link} has two pins in its point {one}; if one of both joints is a guide, give it `toward`"
+            yield f"links.{link}.points", why

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
+from ...core.engines import MATH
 from ...core.errors import InputError
+from ...core.planar import Vec2
+from ...groups.driver import Cylinder, Elbow
 from ...groups.dyad import RRP, Dyad
 from ...groups.group import Group
 from ...mechanism.assur import AssurGroup
@@ -54,7 +57,8 @@ def dead_group(group: AssurGroup, where: str, margin: float) -> InputError:
 def open_group(
     group: AssurGroup,
     where: str,
-    dyad: Group | None,
+    dyad: Group,
+    ground: Mapping[str, Vec2],
     before: Callable[[float], Mechanism],
     places: Sequence[float],
 ) -> InputError:
@@ -64,13 +68,16 @@ def open_group(
     Parameters
     ----------
     where : the first of the places in words
-    dyad : the group with its lengths; None for a driver
+    dyad : the group with its lengths
+    ground : the places of the pins of the ground [m]
     before : the linkage before the group, of the place of the driver
     places : that at which the group does not close, then those over the way
     """
     hint = ": change its lengths"
-    if isinstance(dyad, Dyad | RRP):
-        with suppress(ArithmeticError, ValueError, IndexError):
+    with suppress(ArithmeticError, ValueError, IndexError):
+        if isinstance(dyad, Cylinder | Elbow):
+            hint = _drive_hint(dyad, ground, before, places)
+        elif isinstance(dyad, Dyad | RRP):
             apart = _apart(dyad, before(places[0]))
             gap, size = _gap(dyad, apart)
             if gap <= _ROUNDING * size:
@@ -120,6 +127,40 @@ def _gap_hint(group: Dyad | RRP, apart: Sequence[float]) -> str:
             bar.name: (max(most - length, length - least), least + length)
             for bar, length in ((first, second.length), (second, first.length))
         }
+    return f": {state}; {_remedy(limits)}"
+
+
+def _drive_hint(
+    group: Cylinder | Elbow,
+    ground: Mapping[str, Vec2],
+    before: Callable[[float], Mechanism],
+    places: Sequence[float],
+) -> str:
+    """The same words on a cylinder, or on two arms with a motor, and their lever."""
+    lever, pins = group.lever, (group.bar.pin, group.lever.pin)
+
+    def between(q: float) -> float:
+        one, other = (ground[pin] if pin in ground else before(q).pins[pin].p for pin in pins)
+        return math.sqrt((one - other).squared())
+
+    apart, length = [between(q) for q in places], lever.length
+    state = f"its pins {' and '.join(pins)} are {_mm(apart[0])} apart, {lever.name} is {_mm(length)} long"
+    if isinstance(group, Cylinder):
+        ways = [
+            math.sqrt(max(reach * reach - group.offset * group.offset, 0.0)) - group.shift
+            for reach in (abs(apart[0] - length), apart[0] + length)
+        ]
+        return (
+            f": {state}: it closes at a way from {ways[0]:.4g} m to {ways[1]:.4g} m; change range or lengths"
+        )
+    angles = (group.course_at(MATH, q).place for q in places)
+    both = [(math.sqrt(group.reach(MATH, x)[1].squared()), d) for x, d in zip(angles, apart, strict=True)]
+    limits = max(abs(reach - d) for reach, d in both), min(reach + d for reach, d in both)
+    return f": {state}, its arms reach over {_mm(both[0][0])}; {_remedy({lever.name: limits})}"
+
+
+def _remedy(limits: Mapping[str, tuple[float, float]]) -> str:
+    """The lengths that close a group all the way, by link its least and its largest one [m]."""
     fits = []
     for name, (low, high) in limits.items():
         if high - low > _ROUNDED * low:
@@ -127,8 +168,7 @@ def _gap_hint(group: Dyad | RRP, apart: Sequence[float]) -> str:
             fits.append(
                 f"a length of {name} {'between' if most_text else 'above'} {_mm(low, 1.0)}{most_text}"
             )
-    remedy = f"{' or '.join(fits)} closes it all the way" if fits else "change both lengths"
-    return f": {state}; {remedy}"
+    return f"{' or '.join(fits)} closes it all the way" if fits else "change its lengths"
 
 
 def _mm(length: float, sense: float = 0.0) -> str:

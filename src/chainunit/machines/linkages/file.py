@@ -568,10 +568,12 @@ class _LinkageReader(LoadReader):
             value = self.number("start.phi", table.get("phi", 0.0), "m" if linear else "rad")
             if abs(value) > _LARGEST_START:
                 raise InputError(f"is {shown(table['phi'])}; must be <= {_LARGEST_START:g} in size")
-            if span and not linear and not span[0] <= value <= span[1]:
+            if span and not span[0] <= value <= span[1]:
                 phi_text = f"is {shown(table['phi'])}" if "phi" in table else "is 0 if it is not given"
-                low, high = (f"{math.degrees(end):g} deg" for end in span)
-                raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
+                low, high = (f"{end:g} m" if linear else f"{math.degrees(end):g} deg" for end in span)
+                raise InputError(
+                    f"{phi_text}; must be {'a way' if linear else 'an angle'} in driver.range, from {low} to {high}"
+                )
         self.given_pose(table, pose)
         curves = splines(tables, span is None)
         for joint in joints:

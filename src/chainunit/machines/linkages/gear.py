@@ -370,8 +370,9 @@ class RackMesh(Placed):
 class RackedLink(Group):
     """A rack on a `rail` of the ground that a pinion moves, or without one a pinion on a pin of the ground that a
     rack turns: its bar, the `name` of the joint, the point `mesh` of the rack on its pitch line, the other link `by`.
-    The rack has the direction `d`; the pitch line lies by the `radius` to the left of the `centre`. At the place
-    `start` of the driver the rack is at `place`, the pinion at that angle. The margin is as that of `GearedLink`."""
+    The rack has the direction `d`; the pitch line lies by the `radius` to the left of the `centre`, and at the start
+    values on this `side` of it, +1 or -1. At the place `start` of the driver the rack is at `place`, the pinion at
+    that angle. The margin is as that of `GearedLink`, and below 0 on the other side."""
 
     bar: Bar
     name: str
@@ -380,6 +381,7 @@ class RackedLink(Group):
     centre: str
     d: Vec2
     radius: Any
+    side: float
     rail: Rail | None
     guide: str
     place: float
@@ -425,7 +427,12 @@ class RackedLink(Group):
             way = self.place - d.dot(rail.pin.p) - r * xp.atan2(turned.y, turned.x)
             cosine, mesh = turned.x, RackMesh({3: 1}, d, r, [(ZERO, pinion.t1), (ZERO, pinion.t2)])
             pose, first = (rail.pin.p + d * way, rail.u), Guide(0, d, way, d * way, rail)
-        margin = (cosine - _LEAST_COSINE) * (1.0 / (1.0 - _LEAST_COSINE))
+        margin = (
+            (cosine - _LEAST_COSINE)
+            * (self.side / (1.0 - _LEAST_COSINE))
+            * r
+            / xp.sqrt(r * r + _LEAST_RADIUS**2)
+        )
         return SolvedGroup([pose], (first, mesh), margin)
 
 
@@ -454,18 +461,20 @@ class RackKind(SingleLinkKind):
         joint |= {"guide": next(iter(guides), ""), "centre": pinned.get(GROUND, "")}
 
     def start(self, first: JointEntry, joint: JointEntry, geometry: Any) -> dict[str, float]:
-        """The place of the rack along its guide."""
-        if abs(_pitch(joint, geometry)[1]) < _LEAST_RADIUS:
+        """The side of the pinion on which the rack lies, and its place along its guide."""
+        radius = _pitch(joint, geometry)[1]
+        if abs(radius) < _LEAST_RADIUS:
             (rack, point), centre = joint.on, ".".join(joint.by)
             raise InputError(
                 f"the pitch line of {rack} goes through {centre}, the centre of its pinion, whose pitch radius is "
                 f"0 m; must be > 0: move {rack}.{point}, which is on that line, or the centre to the side",
                 key=f"joints.{joint.name}",
             )
+        side = {f"{joint.name}.side": math.copysign(1.0, radius)}
         if first.kind == REVOLUTE:
-            return {}
+            return side
         d = geometry.rough_line(first)
-        return {joint.on[0]: geometry.rough_place(*joint.on).dot(d) / math.sqrt(d.squared())}
+        return {joint.on[0]: geometry.rough_place(*joint.on).dot(d) / math.sqrt(d.squared()), **side}
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
         """The rack on its guide `first`, or the pinion on its pin."""
@@ -480,14 +489,16 @@ class RackKind(SingleLinkKind):
             bar, mesh, place = parts.hung(link, first), parts.pin(rack, point), parts.structure.poses[link][2]
         parts.receive(joint, mesh, link)
         by, start = pinion if link == rack else rack, parts.structure.start
-        return RackedLink(bar, joint.name, mesh, by, name, d, radius, rail, pin, place, start)
+        side = parts.sides[f"{joint.name}.side"]
+        return RackedLink(bar, joint.name, mesh, by, name, d, radius, side, rail, pin, place, start)
 
     def dead(self, group: AssurGroup, where: str) -> str:
         """See `SingleLinkKind`: half a turn of the pinion."""
         joint = group.joints[1]
         return (
             f"the pinion of {joint.name} has turned by nearly half a turn from its start at {where}, and may swing "
-            "by less than 168 deg about that; take a larger pinion, a shorter way, or a start in its middle"
+            "by less than 168 deg about that; take a larger pinion, a shorter way, or a start in its middle; or the "
+            "pitch line has come to the other side of its centre"
         )
 
 

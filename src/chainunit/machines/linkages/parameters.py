@@ -15,7 +15,7 @@ from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
 from ...core.quantities import Layout, Variable
 from ...mechanism.expressions import CONSTANTS, WORDS, expression
-from ..differing import PLAIN, friction_of
+from ..differing import friction_of
 from .declarations import LOSSES, CommonParameters
 from .entries import EntryReader
 from .loads import MOTION
@@ -81,7 +81,7 @@ class ParameterReader(EntryReader):
                 self.keys(key, entry, (*shared, "kind") if table == "pins" else (*shared,))
                 values = dict(shared)
                 with self.at(f"{key}.kind"):
-                    values |= friction_of(entry.get("kind", PLAIN))
+                    values |= friction_of(entry)
                 for variable in Layout(declared).variables:
                     if (value := entry.get(variable.name)) is not None:
                         with self.at(f"{key}.{variable.name}"):

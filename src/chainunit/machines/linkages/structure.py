@@ -78,20 +78,20 @@ def groups_of(
     """
     moved, driver = {entry.joint: entry.link for entry in drivers}, drivers[0]
     groups = decompose(links, [in_decomposition(joint) for joint in joints], moved)
-    followed = next((group for group in groups if group.kind in FOLLOWED), None)
+    free = any(entry.is_free for entry in drivers)
+    refused = FOLLOWED if free else ON_LEGS if driver.linear or driver.swings else ()
+    followed = next((group for group in groups if group.kind in refused), None)
     if followed is None:
         return groups
     kind, many, link = f"a {followed.kind}", len(followed.links) > 1, followed.links[0]
     who = f"the link{'s' * many} {', '.join(followed.links)} form{'s' * (not many)} {kind}"
-    if any(entry.is_free for entry in drivers):
+    if free:
         law = 'give the other one a law, phi = "..."'
         raise InputError(f"{who}, and two drivers are inputs: {kind} needs one; {law}", key=link)
-    if driver.linear or driver.swings:
-        moves = "swings" if driver.swings else "slides"
-        remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
-        needed = f"{kind} needs a driver that {remedy} drive another link"
-        raise InputError(f"{who}, and the driver {moves}: {needed}", key=link)
-    return groups
+    moves = "swings" if driver.swings else "slides"
+    remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
+    needed = f"{kind} needs a driver that {remedy} drive another link"
+    raise InputError(f"{who}, and the driver {moves}: {needed}", key=link)
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,8 @@ class Structure:
     marked: frozenset[LinkPoint]
     start: float
     poses: Mapping[str, tuple[float, float, float]]
+    span: tuple[float, float] | None
+    """the middle of the range of the first driver, and half of it; None of one that turns all the way round"""
 
     @property
     def drivers(self) -> tuple[DriverEntry, ...]:
@@ -176,6 +178,7 @@ class Structure:
             frozenset(marked),
             start["value"],
             poses,
+            (0.5 * (span[0] + span[1]), 0.5 * (span[1] - span[0])) if (span := data.get("range")) else None,
         )
 
 

@@ -36,6 +36,9 @@
     return ticks;
   };
   const short = (x) => (x !== 0 && (Math.abs(x) < 1e-3 || Math.abs(x) >= 1e6) ? model.digits(x, 2).replace(".0", "").replace(/\u00a0/g, "") : String(Number(x.toPrecision(4))).replace("-", "−"));
+  // a further round of the colours is dashed
+  const dashed = (look) => look >= COLOURS.length;
+  const colour = (curve, n) => (curve.behind ? "#999" : COLOURS[(curve.look ?? n) % COLOURS.length]);
   const COLOURS = ["#0b6fa4", "#c1440e", "#3d3d3d", "#6a994e", "#7a4fa3", "#b08900", "#00857c", "#a23b72", "#666666", "#4a6fe3"];
 
   class Plot {
@@ -88,13 +91,14 @@
           }
         }
         add(size - 1);
-        drawn(this.svg, "path", { class: curve.behind ? "curve behind" : "curve", d: "M" + points.join("L"), stroke: curve.behind ? "#999" : COLOURS[curve.look ?? n % COLOURS.length] });
+        drawn(this.svg, "path", { class: curve.behind ? "curve behind" : "curve", d: "M" + points.join("L"), stroke: colour(curve, n), "stroke-dasharray": dashed(curve.look ?? n) ? "7 5" : "none" });
       });
       this.legend.replaceChildren();
       const named = curves.filter((c) => c.title);
       named.forEach((curve) => {
         const item = make(this.legend, "span");
-        make(item, "i", { style: `background:${curve.behind ? "#999" : COLOURS[(curve.look ?? curves.indexOf(curve)) % COLOURS.length]}` });
+        const look = curve.look ?? curves.indexOf(curve), of = colour(curve, look);
+        make(item, "i", { style: `background:${dashed(look) ? `linear-gradient(90deg, ${of} 40%, #fff 40% 60%, ${of} 60%)` : of}` });
         item.append(curve.title);
       });
       if (this.mark) this.drawMark();

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from ...core.printing.javascript import model_text
+from ...core.quantities import Variable
 from ...core.symbolic_trace import trace
 from ...machines.machine import Machine
 from ...mechanism.sketch import places
@@ -92,11 +94,7 @@ def _results(
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
     model = machine.model
-    port, driver, (effort, _) = (
-        model.driver_port.unit,
-        model.driver_noun,
-        machine_picture.driver_nouns(machine),
-    )
+    driver, effort, port = model.driver_noun, machine_picture.driver_nouns(machine)[0], model.driver_port.unit
     unit, inertia = port("N.m"), port("kg.m2")
     rows: list[tuple[str, str, str, str, str]] = [
         (f"{driver} {effort}, peak", "peak", "crank_torque", unit, ""),
@@ -110,18 +108,29 @@ def _results(
         rows.insert(3, ("rocker torque, peak", "peak", "rocker.tau", "N.m", ""))
     if "margin" in model_columns:
         rows.append(("margin from a dead position, least", "min", "margin", "1", ""))
-    for title, reduction, column, row_unit, by in rows:
+    rows += [(f"{v.description}, peak", "peak", v.name, v.unit, "") for v in _efforts(model)]
+    titles = {output: title for title, output in model.pins.items()}
+    for contact in model.contacts:
+        title = f"contact force of {titles[contact.rpartition('.')[0]]}, least; below 0 it lifts off"
+        rows.append((title, "min", contact, "N", ""))
+    pins = [(force["title"], "peak", f"force({force['of']})", "N", "") for force in forces]
+    for group, (title, reduction, column, row_unit, by) in (*product([""], rows), *product(["pins"], pins)):
         yield {
             "name": f"{reduction}({column})" + (f" {by}" if by else ""),
-            "title": title, "reduce": reduction, "of": column, "by": by, "group": "",
-            **shown_in_unit(row_unit, "", units),
+            "title": title, "reduce": reduction, "of": column, "by": by, "group": group,
+            **shown_in_unit(row_unit, "stress" if row_unit == "N/m2" else "", units),
         }  # fmt: skip
-    for force in forces:
-        column = f"force({force['of']})"
-        yield {
-            "name": f"peak({column})", "title": force["title"], "reduce": "peak", "of": column, "by": "",
-            "group": "pins", **shown_in_unit("N", "", units),
-        }  # fmt: skip
+
+
+def _efforts(model: Any) -> list[Variable]:
+    """The outputs that are efforts of drivers beside the first one, or loads of the bar between two rockers."""
+    outputs = {v.name: v for part in model.parts for v in part.layout.variables}
+    return [
+        v
+        for name, v in outputs.items()
+        for group, _, last in [name.rpartition(".")]
+        if group == "bar" or (last == "tau" and f"{group}.power" in outputs)
+    ]
 
 
 def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
@@ -141,14 +150,12 @@ def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
 def _curves(machine: Machine, model_columns: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The plots over the turn: each has curves of one unit."""
     model = machine.model
-    port, driver, (effort, _) = (
-        model.driver_port.unit,
-        model.driver_noun,
-        machine_picture.driver_nouns(machine),
-    )
+    driver, effort, port = model.driver_noun, machine_picture.driver_nouns(machine)[0], model.driver_port.unit
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
     if "rocker.tau" in model_columns:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
+    drivers = (v for v in _efforts(model) if v.name.endswith(".tau") and v.unit == port("N.m"))
+    curves += [{"title": capital(v.description), "of": v.name, "by": ""} for v in drivers]
     yield {
         "name": "torque",
         "title": capital(effort),
