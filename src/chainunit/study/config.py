@@ -55,8 +55,8 @@ from .parts import (
     Parts,
     beside,
     catalogues_of,
-    entries,
     example,
+    full_names,
     linkage_lines,
     motor_is_left,
     over_example,
@@ -494,7 +494,7 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event]) -> frozenset[st
     """Names of all values that a file gives, events by the names of their runs."""
     if "event" in data:
         data = {**data, "event": dict(zip(events, data["event"], strict=True))}
-    return frozenset(name for name, value in entries(data) if not isinstance(value, Mapping))
+    return frozenset(name for name, is_table in full_names(data) if not is_table)
 
 
 def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str, float]) -> Machine:

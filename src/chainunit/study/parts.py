@@ -163,7 +163,8 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     with faults.collected():
         machine, unusual = _machine_model(table, source)
     faults.refuse()
-    machine, wrong = _with_further(machine, [name for name, _ in entries(named_table(data, "machine"))])
+    names = (name.partition("machine.") for name, _ in full_names(data))
+    machine, wrong = _with_further(machine, [name for before, key, name in names if key and not before])
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
@@ -181,15 +182,16 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(table in data for table in choosing_tables())
 
 
-def entries(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The entries of a table and of all its inner tables, each by its full name."""
+def full_names(data: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
+    """The full names of the entries of a table and of all its inner tables, each with whether it is a table."""
     # not by recursion: a wrong file may be nested without end
     tables = [("", data)]
     for prefix, table in tables:
-        for name, value in table.items():
-            yield prefix + name, value
-            if isinstance(value, Mapping):
-                tables.append((f"{prefix}{name}.", value))
+        for name in table:
+            is_table = isinstance(table[name], Mapping)
+            yield prefix + name, is_table
+            if is_table:
+                tables.append((f"{prefix}{name}.", table[name]))
 
 
 def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:

@@ -22,7 +22,7 @@ from .measures import STARTED, Answers
 from .parts import LENGTHS
 from .permitted_starts import standard_inertia
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
-from .record import LOAD_CYCLE, StudyRecord, StudyRuns, StudySetup
+from .record import LOAD_CYCLE, StudyFindings, StudyRecord, StudyRuns, StudySetup
 from .registry import capabilities, parts_of_line
 from .remark import DECLARED, SEVERITIES, Remark, RemarkCode, fault, note, warning
 from .start_runs import speed_in_star
@@ -80,7 +80,7 @@ def conclude(study: StudyRecord) -> None:
         _on_start(study)
         _on_star(study)
         _on_inertia(study)
-        _on_backward_pull(study)
+        _on_backward_pull(study.setup, study.findings)
         _on_limits(study)
         _on_steady_running(study, study.runs.answers[STEADY])
         if study.setup.drive.foreign is None:
@@ -461,15 +461,14 @@ _BACKWARDS = -0.1
 the resistance of air or liquid is small."""
 
 
-def _on_backward_pull(study: StudyRecord) -> None:
+def _on_backward_pull(setup: StudySetup, findings: StudyFindings) -> None:
     """Warn of a load that no angle of the crank holds without the motor, as the weight of goods on a conveyor that
     rises. A gear that loses as much as it passes on holds it."""
-    setup = study.setup
     if setup.drive.foreign_machine or setup.drive.gear.loss >= 1.0:
         return
     turn = cycle(setup.config.machine, _BACKWARDS * setup.config.run.crank_speed, setup.config.feed)
     if (torque := float(np.min(turn.crank_torque))) > 0.0:
-        study.findings.say(_PULLED_BACK, STEADY, torque=torque)
+        findings.say(_PULLED_BACK, STEADY, torque=torque)
 
 
 _HAPPENINGS = {
