@@ -456,7 +456,10 @@ def test_two_inputs_are_two_drivers(tmp_path):
         *machine(written(tmp_path, CYLINDER_BAR), density="20 kg/m").model.input_layout.names
     }
     uneven = five_bar.replace('rpm="-30"', 'rpm="-20"')
-    assert "moves by -1.33333 turns in a turn of the first driver" in refusal(written(tmp_path, uneven))
+    said = refusal(written(tmp_path, uneven))
+    assert "moves by -1.33333 turns in a turn of the first driver" in said
+    # the slower one is the first already
+    assert "turn the faster one a whole number of times as fast, or let [driver] swing" in said
     address = "j=A,0,0,l,R,t,0,t\nB,0.3,0,l|m,R,f,0,f\nC,0.8,0.9,m|n,R,f,0,f\nD,1.5,0,n|o,R,f,0,f\n"
     address += (
         "E,1.2,0,o,R,t,0,t&l=l,1,1,0,0,A|B\nm,1,1,0,0,B|C\nn,1,1,0,0,C|D\no,1,1,0,0,D|E&f=&s=10,true,true,m"
