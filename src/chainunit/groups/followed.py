@@ -1,4 +1,4 @@
-"""A group without a closed form: its coordinates are followed once around the turn of the crank.
+"""A group without a closed form: its coordinates are followed once over the way of the driver.
 
 Plates stand on legs (`chainunit.groups.legs`): the places of the plates are the coordinates of the group, and each
 leg gives an equation. Newton's method solves as many equations as there are coordinates; these rows are what is left
@@ -8,7 +8,11 @@ In a linkage with one crank the coordinates are smooth periodic functions of the
 follows them once around, from the mode to which `assembly` leads at the crank angle `start`, and keeps them as a
 Fourier series. At any angle the series gives coordinates that are nearly right, and Newton's method makes them exact.
 So they depend on the crank angle alone, independent of the step and the history. The branch cannot jump; a branch
-that ends within the turn has a misfit.
+that ends within the turn has a misfit. A driver with a range goes through it to and fro, as the cosine of an angle
+does in a turn.
+
+Legs that yield may be more than the coordinates: Newton's method then makes the sum of their gaps, squared and
+weighted, least.
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from ..core.planar import Motion, Vec2
-from .block import minus_cofactors
+from .block import least_squares, minus_cofactors
 from .group import Group, SolvedGroup
 from .joints import LinkageInMotion, Placed
 from .legs import Leg, LegAt
@@ -30,6 +34,8 @@ HARMONICS = 8
 """Number of harmonics in the series of a coordinate."""
 MOST_MISFIT = 1e-10
 """Largest misfit of a leg that counts as closed, in parts of its length."""
+_LARGE_MISFIT = 1e-9
+"""Misfit of legs that yield at which their margin is 0."""
 STEPS = 3
 """Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
 TERMS = 2 * HARMONICS + 1
@@ -45,6 +51,11 @@ def corrected(
     x = (*near,)
     for _ in range(steps):
         legs = legs_at(x)
+        if legs[0].stiffness is not None:
+            parts, _ = least_squares([leg.row for leg in legs], [leg.weight for leg in legs])
+            pairs = [*zip(legs, parts, strict=True)]
+            x = tuple(place + sum(leg.gap * part[k] for leg, part in pairs) for k, place in enumerate(x))
+            continue
         minus, det = minus_cofactors([leg.row for leg in legs])
         minus_per = -1.0 / det
         moved = (sum(leg.gap * row[k] for leg, row in zip(legs, minus, strict=True)) for k in range(len(x)))
@@ -54,9 +65,10 @@ def corrected(
 
 class SolvedOnLegs(SolvedGroup):
     """A solved group of plates on `legs`. Its `links` are the legs and then the plates; its `margin` is the
-    determinant over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position."""
+    determinant over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position. Of legs that
+    yield it is the `hold`, the root mean square of such determinants by stiffness, if the legs fit."""
 
-    __slots__ = ("legs",)
+    __slots__ = ("hold", "legs")
 
     def __init__(
         self,
@@ -76,17 +88,35 @@ class SolvedOnLegs(SolvedGroup):
         size = 1.0
         for plate in spots:
             size = size * xp.sqrt(sum((s - plate[k - 1]).squared() for k, s in enumerate(plate)))
+        yields = legs[0].stiffness is not None
         for leg in legs:
-            size = size if leg.length is None else size * leg.length
-        joints = (*held, *(leg.outer for leg in legs), *(leg.inner for leg in legs))
+            size = size if leg.length is None or yields else size * leg.length
+        outer, inner = zip(*(leg.joints for leg in legs), strict=True)
+        joints = (*held, *outer, *inner)
         super().__init__((*(leg.pose for leg in legs), *plates), joints, size=size)
+        if yields:
+            # plates have one coordinate, or three; legs that do not fit, or have a stiffness below 0, have no margin
+            least, total = xp.maximum(self._matrix.det, 0.0), sum(xp.sqrt(leg.stiffness) ** 2 for leg in legs)
+            fit = 1.0 - sum(leg.misfit(xp) * leg.misfit(xp) for leg in legs) * (1.0 / _LARGE_MISFIT) ** 2
+            self.hold = xp.sqrt(least / (total if held else total * total * total)) / size
+            self.margin = self.hold * fit
+
+    def least_fit(self) -> tuple[float, float, int]:
+        """Of legs that yield, by how much the one that strains them most is too short, if the others fit, in parts
+        of its length and in m, and its number."""
+        gaps = [leg.shortness for leg in self.legs]
+        pulls = [leg.stiffness * gap for leg, gap in zip(self.legs, gaps, strict=True)]
+        energy = sum(pull * gap for pull, gap in zip(pulls, gaps, strict=True))
+        number = max(range(len(pulls)), key=lambda k: abs(pulls[k]))
+        gap = energy / pulls[number] if pulls[number] else 0.0
+        return abs(gap) / (self.legs[number].length or 1.0), gap, number
 
 
 class FollowedGroup(Group):
     """A group of plates on legs as data. `assembly` are coordinates from which Newton's method leads to the assembly
     mode at the crank angle `start` [rad]; `turns` is how often each coordinate turns counter-clockwise in a turn of
-    the crank, none at all if it is empty: the rest of it is periodic. Its bars are its `legs`, then its plates;
-    `kind` and `name` are for a refusal."""
+    the crank, none at all if it is empty: the rest of it is periodic. `span` is the range of a driver that does not
+    turn round. Its bars are its `legs`, then its plates; `kind` and `name` are for a refusal."""
 
     kind: ClassVar[str]
     name: str
@@ -94,6 +124,12 @@ class FollowedGroup(Group):
     assembly: Sequence[Any]
     start: float
     turns: Sequence[float]
+    span: Sequence[float]
+
+    @property
+    def derived_count(self) -> int:
+        """The series of its coordinates, the largest misfit, and the least margin."""
+        return len(self.assembly) * TERMS + 2
 
     def at_position(self, linkage: LinkageInMotion) -> Any:
         """What it needs of the linkage `linkage` before it."""
@@ -110,7 +146,8 @@ class FollowedGroup(Group):
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedOnLegs:
         """The group with the linkage `linkage` before it, on the branch that the series `derived` gives."""
         placed = self.at_position(linkage)
-        near = values_of(derived, len(self.assembly), TERMS, xp.cos(q), xp.sin(q))
+        cos, sin = (self._part(q), None) if self.span else (xp.cos(q), xp.sin(q))
+        near = values_of(derived, len(self.assembly), TERMS, cos, sin)
         for k, turn in enumerate(self.turns):
             near[k] = near[k] + turn * q if turn else near[k]
         return self.solved(xp, placed, self._corrected(xp, placed, near, STEPS))
@@ -121,25 +158,41 @@ class FollowedGroup(Group):
     def _followed(
         self, xp: Any, before: Callable[[float], LinkageInMotion], angles: Sequence[float]
     ) -> list[tuple[Any, ...]]:
-        """The coordinates at these crank angles, each from the ones before it."""
-        course = [self._corrected(xp, self.at_position(before(angles[0])), self.assembly, 8)]
+        """The coordinates at these angles of a turn, each from the ones before it."""
+        course = [self._corrected(xp, self.at_position(before(self._place(angles[0]))), self.assembly, 8)]
         for q in angles[1:]:
             near = course[-1]
             if len(course) > 1:
                 near = tuple(2.0 * now - last for now, last in zip(near, course[-2], strict=True))
-            course.append(self._corrected(xp, self.at_position(before(q)), near, STEPS))
+            course.append(self._corrected(xp, self.at_position(before(self._place(q))), near, STEPS))
         return course
+
+    def _part(self, q: Any) -> Any:
+        """A place in the range of the driver, from -1 to 1."""
+        low, high = self.span
+        return (q - 0.5 * (low + high)) * (2.0 / (high - low))
+
+    def _place(self, angle: float) -> float:
+        """The place of the driver at an angle of a turn."""
+        if not self.span:
+            return angle
+        low, high = self.span
+        return 0.5 * (low + high + (high - low) * math.cos(angle))
+
+    def _angles(self, count: int) -> list[float]:
+        """Angles of a turn from the start on, in steps of which `SAMPLES` go round."""
+        start = math.acos(min(max(self._part(self.start), -1.0), 1.0)) if self.span else self.start
+        return [start + 2.0 * math.pi * k / SAMPLES for k in range(count)]
 
     def turns_in_a_turn(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> tuple[float, ...]:
         """How often each coordinate turns in a turn of the crank, see `turns`."""
-        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
-        first, *_, last = self._followed(xp, before, angles)
+        first, *_, last = self._followed(xp, before, self._angles(SAMPLES + 1))
         return tuple(float(round((b - a) / (2.0 * math.pi))) for a, b in zip(first, last, strict=True))
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
-        """The series of the coordinates over the crank angle, the largest misfit and the least margin around;
-        `before` gives the linkage before the group at a crank angle [rad]."""
-        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
+        """The series of the coordinates over the place of the driver, the largest misfit and the least margin on the
+        way; `before` gives the linkage before the group at a place [rad, m]."""
+        angles = self._angles(SAMPLES)
         courses = zip(*self._followed(xp, before, angles), strict=True)
         series: list[Any] = []
         for course, turn in zip(courses, self.turns or [0.0] * len(self.assembly), strict=True):
@@ -148,7 +201,7 @@ class FollowedGroup(Group):
         # the misfit as in a run, at angles halfway between the samples
         misfit, first, least = 0.0, None, None
         for q in angles:
-            middle = q + math.pi / SAMPLES
+            middle = self._place(q + math.pi / SAMPLES)
             group = self.solve(xp, middle, before(middle), series)
             for leg in group.legs:
                 misfit = xp.maximum(misfit, xp.minimum(leg.misfit(xp), 1.0))

@@ -18,11 +18,15 @@ def series_of(values: Sequence[Any], angles: Sequence[float], harmonics: int) ->
 
 
 def values_of(series: Sequence[Any], count: int, terms: int, cos: Any, sin: Any) -> list[Any]:
-    """The values of `count` such series, each of so many `terms`, from cosine and sine of the angle."""
+    """The values of `count` such series, each of so many `terms`, from cosine and sine of the angle; from the cosine
+    alone, with None for the sine, if they are even."""
     sums = [series[k * terms] for k in range(count)]
-    c, s = cos, sin
+    c, s, last = cos, 0.0 if sin is None else sin, 1.0
     for n in range(1, terms // 2 + 1):
         for k in range(count):
             sums[k] = sums[k] + series[k * terms + 2 * n - 1] * c + series[k * terms + 2 * n] * s
-        c, s = c * cos - s * sin, s * cos + c * sin
+        if sin is None:
+            c, last = 2.0 * cos * c - last, c
+        else:
+            c, s = c * cos - s * sin, s * cos + c * sin
     return sums

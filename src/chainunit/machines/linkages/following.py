@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...groups.followed import MOST_MISFIT, FollowedGroup
+from ...groups.followed import MOST_MISFIT, STEPS, FollowedGroup, corrected
+from ...groups.tetrad import SharedPlate
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
-from .closing import LEAST_MARGIN, dead_group, open_group
+from .closing import LEAST_MARGIN, dead_group, misfit_of_leg, open_group
 from .outputs import DescribedLinkage
 from .structure import FOLLOWED, Structure
 from .way import WHOLE, DriverWay
@@ -91,7 +92,7 @@ class FollowedLinkage:
         angles = {name: [angle] for name, angle in (near or poses).items()}
         margins = self.margins = []
         try:
-            check_followed(self.linkage, self.derived)
+            self._check_followed()
             for q in places:
                 m = self.at(q)
                 self.signs = self.signs or signs_of(m.margins())
@@ -137,7 +138,57 @@ class FollowedLinkage:
         low, high = self.way.span
         places = [q, *(low + (high - low) * n / _PLACES for n in range(_PLACES + 1))]
         group = self.linkage.groups[k - self._drivers] if k >= self._drivers else None
+        if isinstance(group, SharedPlate) and (fault := self._fault_of_shared(k, group, places[1:])):
+            return fault
         return open_group(self.structure.groups[k], self.way.words(q), group, self._before(k), places)
+
+    def _fault_of_shared(self, k: int, plate: SharedPlate, places: Sequence[float]) -> InputError | None:
+        """The refusal of the group `k` of the structure, a plate on redundant legs: by its first dead position on the
+        way from the start, or one before it, or else by the leg that fits least; None if it has no such fault."""
+        before, signs, worst = self._before(k), list[float](), (0.0, 0.0, 0, plate.start)
+        for way in ([q for q in places if q >= plate.start], [q for q in places[::-1] if q < plate.start]):
+            near, last, last_q = plate.assembly, list[float](), plate.start
+            for q in (plate.start, *way):
+                try:
+                    m = before(q)
+                except (ArithmeticError, ValueError, IndexError):
+                    n = self._open_at(q)
+                    return None if n is None or n >= k else self._open_group(n, q)
+                signs = signs or signs_of(m.margins())
+                margins, fit = signed(m.margins(), signs), None
+                with suppress(ArithmeticError, ValueError):
+                    placed = plate.at_position(m)
+                    near = corrected(partial(plate.legs_at, MATH, placed), near, 2 * STEPS)
+                    group = plate.solved(MATH, placed, near)
+                    margins, fit = [*margins, group.hold], group.least_fit()
+                margins += [0.0] * (fit is None)
+                for n, (margin, before_it) in enumerate(zip(margins, last or margins, strict=True)):
+                    # it falls evenly to a dead position, at the next place or before it
+                    if not min(margin, 2.0 * margin - before_it) > LEAST_MARGIN:
+                        ahead = (q - last_q) * margin / (before_it - margin) if last else 0.0
+                        return dead_group(self.structure.groups[n], self.way.words(q + ahead), 0.0)
+                last, last_q = margins, q
+                worst = max(worst, (*(fit or (0.0, 0.0, 0)), q))
+        part, gap, leg, q = worst
+        if not part > MOST_MISFIT:
+            return None
+        return misfit_of_leg(self.structure.groups[k], leg, gap, self.way.words(q))
+
+    def _check_followed(self) -> None:
+        """Refuse groups on legs that cannot be followed all the way."""
+        for group, misfit in misfits(self.linkage, self.derived):
+            if misfit <= MOST_MISFIT:
+                continue
+            k = self.linkage.groups.index(group) + self._drivers
+            if isinstance(group, SharedPlate):
+                raise self._open_group(k, self.way.start)
+            bars, legs = group.bars, len(group.legs)
+            links = ", ".join(bar.name for bar in (*bars[legs:], *bars[:legs]))
+            raise InputError(
+                f"the {group.kind} of {links} does not close all the way round, or moves too sharply to be "
+                "followed: change its lengths",
+                key=f"links.{group.name}",
+            )
 
     def _open_at(self, q: float) -> int | None:
         """The number of the first group of the structure that does not close at a place; None if all close."""
@@ -310,16 +361,3 @@ def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[Followed
         last += group.derived_count
         if isinstance(group, FollowedGroup):
             yield group, derived[last - 2]
-
-
-def check_followed(linkage: Linkage, derived: Sequence[Any]) -> None:
-    """Refuse triads and tetrads that cannot be followed all the way round."""
-    for group, misfit in misfits(linkage, derived):
-        if not misfit <= MOST_MISFIT:
-            bars, legs = group.bars, len(group.legs)
-            links = ", ".join(bar.name for bar in (*bars[legs:], *bars[:legs]))
-            raise InputError(
-                f"the {group.kind} of {links} does not close all the way round, or moves too sharply to be "
-                "followed: change its lengths",
-                key=f"links.{group.name}",
-            )

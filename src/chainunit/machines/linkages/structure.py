@@ -19,8 +19,8 @@ FOLLOWED = (*ON_LEGS, KINDS[CAM].alone)
 
 @dataclass(frozen=True)
 class LinkEntry:
-    """A link as described: its points [m], mass [kg], inertia about the centroid [kg m2], centroid [m], and further
-    masses at points [kg]."""
+    """A link as described: its points [m], mass [kg], inertia about the centroid [kg m2], centroid [m], further
+    masses at points [kg], and the stiffness [N/m] by which it shares a force, 0 if it has none."""
 
     name: str
     points: Mapping[str, Sequence[Entry]]
@@ -28,6 +28,7 @@ class LinkEntry:
     inertia: Entry
     centroid: Sequence[Entry]
     masses: Mapping[str, Entry]
+    stiffness: Entry
 
     @property
     def heavy(self) -> bool:
@@ -86,7 +87,7 @@ def groups_of(
     if any(entry.is_free for entry in drivers):
         law = 'give the other one a law, phi = "..."'
         raise InputError(f"{who}, and two drivers are inputs: {kind} needs one; {law}", key=link)
-    if driver.linear or driver.swings:
+    if followed.kind not in ON_LEGS and (driver.linear or driver.swings):
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
         needed = f"{kind} needs a driver that {remedy} drive another link"
@@ -99,7 +100,8 @@ class Structure:
     """A linkage without numbers: entries by name, the groups in order, the names of pins, and the assembly.
 
     `driver` is the first one, and `further` are the others. `marked` are the points, by link and name, that joints or
-    loads need on this very link; `poses` are rough poses (x, y, angle) of all links at the driver's value `start`."""
+    loads need on this very link; `poses` are rough poses (x, y, angle) of all links at the driver's value `start`;
+    `span` is its range, if it has one."""
 
     ground: Mapping[str, Sequence[Entry]]
     links: Mapping[str, LinkEntry]
@@ -111,6 +113,7 @@ class Structure:
     marked: frozenset[LinkPoint]
     start: float
     poses: Mapping[str, tuple[float, float, float]]
+    span: Sequence[float]
 
     @property
     def drivers(self) -> tuple[DriverEntry, ...]:
@@ -143,6 +146,7 @@ class Structure:
                 link.get("inertia", 0.0),
                 link.get("centroid", [0.0, 0.0]),
                 link.get("masses", {}),
+                link.get("stiffness", 0.0),
             )
             for link in data["links"]
         }
@@ -176,6 +180,7 @@ class Structure:
             frozenset(marked),
             start["value"],
             poses,
+            data.get("range") or (),
         )
 
 
