@@ -31,10 +31,12 @@ def rotation(angle):
 class Multibody:
     """A linkage from its description; `inputs` have values by name. `wheels` has the wheel of each gear that
     has its rough angle at the start. `profiles` has for each cam the rough angle of its profile at the contact at the
-    start, and the radius over that angle with two derivatives, a function that takes complex numbers."""
+    start, and the radius over that angle with two derivatives, a function that takes complex numbers. `springs` has
+    for joints that yield the stiffness [N/m], and the two points of a link between which a pin yields, or None for a
+    guide, which yields across its line: the joints may then be more than needed."""
 
-    def __init__(self, data, inputs=None, wheels=None, profiles=None):
-        self.data, self.profiles = data, profiles or {}
+    def __init__(self, data, inputs=None, wheels=None, profiles=None, springs=None):
+        self.data, self.profiles, self.springs = data, profiles or {}, springs or {}
         self.values = {each["name"]: each["value"] for each in (*data["parameters"], *data["inputs"])}
         self.values |= {"g": data["common"].get("g", 9.81), "ratio": 1.0}
         for link in data["links"]:
@@ -267,11 +269,40 @@ class Multibody:
             # angles hold but for whole turns
             for k in self.angular:
                 gaps[k] = math.remainder(gaps[k], 2.0 * math.pi)
-            step = np.linalg.solve(rows, gaps)
+            step = self.solved(rows, gaps)
             x = x - step
             if np.max(np.abs(step)) < 1e-13:
                 return x
         return x if np.max(np.abs(step)) < 1e-11 else None
+
+    def solved(self, rows, right):
+        """The unknowns of rows, of which some may be redundant."""
+        if not self.springs:
+            return np.linalg.solve(rows, right)
+        x, _, rank, _ = np.linalg.lstsq(rows, right, rcond=1e-13)
+        assert rank == rows.shape[1]
+        return x
+
+    def factors(self, rows, right, x):
+        """The multipliers of all rows, which carry the `right` sides. With springs the unknowns move by z, so that
+        rows z is the compliance times the multipliers."""
+        if not self.springs:
+            return np.linalg.solve(rows.T, right)
+        count, size = rows.shape
+        compliance, k = np.zeros((count, count)), 0
+        for joint in self.joints:
+            if joint["name"] in self.springs:
+                stiffness, ends = self.springs[joint["name"]]
+                d = np.array([1.0, 0.0])  # of a guide the first row is across its line
+                if ends is not None:
+                    link, *names = ends
+                    a, b = (self.place(x, link, self.points[link][name])[0] for name in names)
+                    d = (b - a) / np.hypot(*(b - a))
+                compliance[k : k + 2, k : k + 2] = np.outer(d, d) / stiffness
+            k += 2
+        unit = min((stiffness for stiffness, _ in self.springs.values()))
+        whole = np.block([[-compliance * unit, rows], [rows.T, np.zeros((size, size))]])
+        return np.linalg.solve(whole, np.append(np.zeros(count), right))[:count]
 
     @property
     def angular(self):
@@ -301,12 +332,12 @@ class Multibody:
         _, rows = self.equations(x, q)
         q, w, a = (np.atleast_1d(each).astype(float) for each in (q, w, a))
         signs = np.array([1.0 if driver["linear"] else driver["sense"] for driver in self.drivers])
-        by_q = np.zeros((size, signs.size))
+        by_q = np.zeros((len(rows), signs.size))
         by_q[-signs.size :] = np.diag(signs)
-        v = np.linalg.solve(rows, by_q @ w)
+        v = self.solved(rows, by_q @ w)
         # rows(x) v = by_q w, so that rows x'' = by_q a - (rows along v) v
         along = self.equations(x.astype(complex) + 1e-30j * v, q)[1].imag / 1e-30
-        accel = np.linalg.solve(rows, by_q @ a - along @ v)
+        accel = self.solved(rows, by_q @ a - along @ v)
         q, w = q[0], w[0]
 
         def motion(link, local):
@@ -350,7 +381,7 @@ class Multibody:
                 force = rotation(angle) @ force
             applied += by.T @ force
             load_power += force @ speed
-        factors = np.linalg.solve(rows.T, needed - applied)
+        factors = self.factors(rows, needed - applied, x)
         found = {"kinetic_energy": kinetic, "potential_energy": potential, "load_power": load_power}
         names = ("tau", *(f"{driver['name']}.tau" for driver in self.drivers[1:]))
         found |= dict(zip(names, factors[-signs.size :] * signs, strict=True))

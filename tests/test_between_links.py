@@ -268,6 +268,26 @@ def test_the_start_chooses_the_branch_and_it_is_followed():
     assert np.min(np.abs(machines[0] - machines[1])) > 1.0
 
 
+@pytest.mark.parametrize("span", [(-0.5, 2.0), (0.0, 6.2), (-0.3, 0.4)])
+def test_a_tetrad_with_a_driver_that_swings(span):
+    """Over its range, and a little beyond it, as Newton's method on all joints follows it."""
+    text = texts.STEPHENSON.replace('link = "crank"', f'link = "crank"\nrange = [{span[0]}, {span[1]}]')
+    machine, body = (
+        Machine(linkage_from(toml(text), "machine")[0]),
+        Multibody(description_of(toml(text), "machine")),
+    )
+    pose = body.followed(span[0])
+    for q in np.linspace(span[0], span[1], 25):
+        pose = body.closed(q, pose)
+        out, want = (
+            machine.evaluate({"phi": q, "w": 2.0, "a": -5.0, "drag": 30.0}),
+            body.solution(pose, q, 2.0, -5.0),
+        )
+        size = max(abs(want[f"{joint['name']}.fx"]) for joint in body.joints)
+        for key in ("tau", *(f"{joint['name']}.{axis}" for joint in body.joints for axis in ("fx", "fy"))):
+            assert out[key] == pytest.approx(want[key], abs=1e-11 * size), (q, key)
+
+
 def test_plates_that_turn_with_the_crank():
     machine, _ = machine_of("tetrad that turns")
     out = machine.evaluate({"phi": np.linspace(0.0, 2.0 * math.pi, 145)})
@@ -332,10 +352,6 @@ def test_refusals_of_tetrads():
     for changes, words in (
         ([("A = [0.1, 0]", "A = [0.5, 0]")], open_tetrad),
         ([("C = [0.92, 0]", "C = [2.6, 0]")], open_tetrad),
-        (
-            [('link = "crank"', 'link = "crank"\nrange = ["0 deg", "40 deg"]')],
-            "the links one, two, upper, lower form a tetrad, and the driver swings: a tetrad needs a driver that",
-        ),
         (
             [("[links.one]", '[links.fan]\npoints = { P = [0, 0] }\n[drivers.fan]\nlink = "fan"\nrange = [0, 1]\n'
               "[links.one]")],

@@ -37,6 +37,7 @@ KINDS = {
     "blake_jaw_crusher": ["RRR", "RRR"],
     "chain_unit": ["RRR", "RRR", "RRR"],
     "chain_unit_points": ["RRR", "RRR", "RRR"],
+    "coupling_rods": ["shared plate"],
     "crank_shaper": ["RPR", "RRP"],
     "cylinder_lift": ["RRR"],
     "dwell_six_bar": ["RRR", "RRR"],
@@ -159,6 +160,14 @@ def test_the_plate_tilts_and_the_beam_swings_as_the_file_says():
     out = turn("stephenson_two_six_bar")
     swings = [np.ptp(np.degrees(link.angle)) for link in (out.plate, out.beam)]
     assert swings == pytest.approx(sizes, abs=0.05)
+
+
+def test_the_coupling_rods_bear_what_the_file_says():
+    (most,) = said("coupling_rods", r"up to (\S+) kN")
+    out = turn("coupling_rods")
+    forces = [np.hypot(pin.fx, pin.fy) for pin in (out.A, out.A9)]
+    assert [np.max(force) / 1e3 for force in forces] == pytest.approx([most, most], abs=0.05)
+    assert np.max(np.minimum(*forces)) > 0.7e3 * most > np.min(np.maximum(*forces)) * 0.9
 
 
 @pytest.mark.parametrize(

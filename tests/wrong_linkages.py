@@ -248,7 +248,7 @@ CHANGES = [
     ([("[links.ram]", "[links.extra]\n[links.ram]")],
      [(24, "links.extra", "has no points; give points = {")]),
     (added('[joints.more]\non = "ram.T"\nby = "ground.G"'),
-     [(24, "links.ram", "take out a joint, such as more")]),
+     [(24, "links.ram", "without the joint more the linkage closes all the way")]),
     ([('"80 mm", min', '"500 mm", min'), ('"200 mm"', '"2 m"')],
      [(21, "links.rod", "cannot close at 20 deg of crank")]),
     ([('"80 mm", min', '"360 mm", min'), ('"200 mm"', '"2 m"'), ('["25 mm"', "[0"), ('["25 mm"', "[0")],

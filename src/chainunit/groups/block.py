@@ -6,13 +6,17 @@ integers. They are the pivots at first, so that nothing is divided. A column tha
 between two pins, is a pivot after these rows are turned against each other: it is the square of a length. What is
 left are 3 x 3 unknowns at most, for Cramer's rule. So nothing divides by a quantity that vanishes outside a dead
 position.
+
+Rows that yield, with a stiffness each, may be more than the unknowns that the others leave. The unknowns then make
+their strain energy least, and the multipliers share the force by it (Menabrea).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 Row = dict[int, Any]
@@ -53,17 +57,24 @@ class _Step(NamedTuple):
 
 
 class GroupMatrix:
-    """A system of `rows` for as many of the unknowns, which number `size`. `det` is the determinant of the part that
-    Cramer's rule solves: 0 is a dead position. The rows are used up."""
+    """A system of `rows` for as many of the unknowns, which number `size`; rows with a `stiffness` [N/m], by number,
+    yield. `det` is the determinant of the part that Cramer's rule solves: 0 is a dead
+    position. The rows are used up."""
 
     __slots__ = ("_inverse", "_plan", "_size", "_steps", "det")
 
-    def __init__(self, size: int, rows: list[Row]) -> None:
+    def __init__(
+        self, size: int, rows: list[Row], stiffness: Mapping[int, Any] = MappingProxyType({})
+    ) -> None:
         self._size = size
         pattern = [tuple([(j, x if type(x) is int else None) for j, x in row.items()]) for row in rows]
-        plan = self._plan = _plan(tuple(pattern))
+        plan = self._plan = _plan(tuple(pattern), tuple(stiffness))
         self._steps = [_eliminated(rows, pivot) for pivot in plan.pivots]
-        minus, self.det = minus_cofactors([[rows[i].get(j, 0) for j in plan.unknowns] for i in plan.rows])
+        left = [[rows[i].get(j, 0) for j in plan.unknowns] for i in plan.rows]
+        if stiffness:
+            self._inverse, self.det = least_squares(left, [*stiffness.values()])
+            return
+        minus, self.det = minus_cofactors(left)
         # casadi turns each use of 1/x into a division by x, but keeps -1/x
         minus_per = -1.0 / self.det
         self._inverse = [[c * minus_per for c in row] for row in minus]
@@ -114,6 +125,23 @@ def minus_cofactors(m: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
     return minus, -sum([x * y for x, y in zip(a, minus[0], strict=True)])
 
 
+def least_squares(rows: Sequence[Sequence[Any]], weights: Sequence[Any]) -> tuple[list[list[Any]], Any]:
+    """By row, its part in each of up to 3 unknowns per right side, with the least sum of `weights` times misfits
+    squared; and the determinant of the equations of these unknowns."""
+    weighted = [[w * x for x in row] for row, w in zip(rows, weights, strict=True)]
+    columns = [*zip(*rows, strict=True)]
+    normal = [
+        [sum([a * b for a, b in zip(one, other, strict=True)]) for other in columns]
+        for one in zip(*weighted, strict=True)
+    ]
+    minus, det = minus_cofactors(normal)
+    minus_per = -1.0 / det
+    inverse = [[c * minus_per for c in row] for row in minus]
+    return [
+        [sum([x * c for x, c in zip(row, part, strict=True)]) for part in inverse] for row in weighted
+    ], det
+
+
 def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
@@ -152,18 +180,19 @@ def _add(row: Row, other: Row, factor: Any) -> None:
 
 
 @cache
-def _plan(pattern: tuple[tuple[tuple[int, int | None], ...], ...]) -> Plan:
-    """The plan of a system, from its coefficients that are known beforehand; None is one that is not."""
+def _plan(pattern: tuple[tuple[tuple[int, int | None], ...], ...], yielding: tuple[int, ...] = ()) -> Plan:
+    """The plan of a system, from its coefficients that are known beforehand; None is one that is not. The rows that
+    are `yielding` are left for least squares."""
     rows: list[Row] = [{j: math.nan if x is None else x for j, x in row} for row in pattern]
     left, pivots = set(range(len(rows))), []
-    while pivot := _next(rows, left):
+    while pivot := _next(rows, left, yielding):
         pivots.append(pivot)
         left.remove(pivot.row)
         _eliminated(rows, pivot)
     return Plan(pivots, sorted(left), sorted({j for i in left for j in rows[i]}))
 
 
-def _next(rows: Sequence[Row], left: set[int]) -> Pivot | None:
+def _next(rows: Sequence[Row], left: set[int], yielding: Collection[int]) -> Pivot | None:
     """The pivot that changes least, of equal ones that in the last row; None if the rest is for Cramer's rule."""
     columns: dict[int, list[int]] = {}
     for i in sorted(left):
@@ -173,10 +202,10 @@ def _next(rows: Sequence[Row], left: set[int]) -> Pivot | None:
         ((len(rows[i]) - 1) * (len(column) - 1), -i, j)
         for j, column in columns.items()
         for i in column
-        if rows[i][j] in (1, -1)
+        if i not in yielding and rows[i][j] in (1, -1)
     ]
     changes, i, j = min(units, default=(math.inf, 0, 0))
-    if len(left) > _CRAMER and changes > _FEW:
+    if not yielding and len(left) > _CRAMER and changes > _FEW:
         for unknown, column in columns.items():
             if len(column) == 2:
                 return Pivot(column[0], unknown, (), column[1])

@@ -19,7 +19,7 @@ from ..core.planar import ZERO, Link, Vec2, mirrored, rotated
 from .body import Bar
 from .group import Group, Outline, SolvedGroup
 from .joints import Contact, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Placed, Rail
-from .series import even_value_of, series_of, values_of
+from .series import Revolution, series_of
 
 SAMPLES, HARMONICS = 48, 16
 """Places of the driver at which a follower is followed once around, and the order of the series."""
@@ -65,8 +65,8 @@ class CamFollower(Group):
     angle 0; `curve` the radius over the angle; `roller` that of the roller, with which the profile `grows` to the
     pitch curve; `face` the normal of a face, away from the cam. `guide` is the pin of the force of the rail. The
     angle of the contact, from the pin of the follower or its rail, is `near` at the place `start` of the driver,
-    which turns all the way round, or goes to and fro about the middle of its `span` by half of it. The margin is the
-    cosine of the pressure angle, below 0 of an undercut profile."""
+    which turns all the way round, or goes to and fro within its `span`. The margin is the cosine of the pressure
+    angle, below 0 of an undercut profile."""
 
     bar: Bar
     pin: str
@@ -81,7 +81,7 @@ class CamFollower(Group):
     guide: str
     near: float
     start: float
-    span: tuple[float, float] | None = None
+    span: Sequence[float] = ()
 
     derived_count: ClassVar[int] = 2 * HARMONICS + 1
     """The number of values that `derive` gives: the series of the angle of the contact."""
@@ -158,13 +158,9 @@ class CamFollower(Group):
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """See `derived_count`."""
-        turn = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-        places = angles = [self.start + angle for angle in turn]
-        if self.span is not None:
-            # to and fro within the range: the place is a cosine, and the series has no sines
-            (middle, half), first = self.span, (self.start - self.span[0]) / self.span[1]
-            angles = [math.acos(max(-1.0, min(1.0, first))) + angle for angle in turn]
-            places = [middle + half * math.cos(angle) for angle in angles]
+        way = Revolution(self.start, self.span)
+        angles = way.angles(SAMPLES, SAMPLES)
+        places = [way.place(angle) for angle in angles]
         course = [self._found(xp, self._sight(before(places[0])), self.near, _FIRST)[0]]
         for q in places[1:]:
             near = 2.0 * course[-1] - course[max(len(course) - 2, 0)]
@@ -174,10 +170,7 @@ class CamFollower(Group):
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The follower on the profile, near the angle that the series `derived` gives."""
         sight = self._sight(linkage)
-        if self.span is None:
-            (near,) = values_of(derived, 1, self.derived_count, xp.cos(q), xp.sin(q))
-        else:
-            near = even_value_of(derived, (q - self.span[0]) / self.span[1])
+        (near,) = Revolution(self.start, self.span).values(xp, derived, 1, self.derived_count, q)
         _, spot = self._found(xp, sight, near, _LAST)
         gap, _, size, margin = self._gap(xp, sight, spot)
         miss, room = gap / (size * _MISFIT), spot.curvature

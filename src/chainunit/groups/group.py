@@ -11,7 +11,7 @@ from itertools import zip_longest
 from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
-from .block import GroupMatrix
+from .block import GroupMatrix, Row
 from .body import Bar, Load
 from .joints import SLIDES, UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Rail, Seat, Third
 
@@ -40,9 +40,13 @@ class SolvedGroup:
         course : of a driver, the derivatives of its place by q
         """
         self._joints, self.course = joints, course
-        matrix = self._matrix = GroupMatrix(
-            UNKNOWNS * len(poses), [row for joint in joints for row in joint.rows()]
-        )
+        rows: list[Row] = []
+        stiffness = {}
+        for joint in joints:
+            rows += joint.rows()
+            if joint.stiffness is not None:
+                stiffness[len(rows) - 1] = joint.stiffness
+        matrix = self._matrix = GroupMatrix(UNKNOWNS * len(poses), rows, stiffness)
         self._rates: list[list[Any]] = []
         for _ in range(2):
             self._rates.append(self._next_rates())
@@ -98,8 +102,13 @@ class Outline(NamedTuple):
 class Group:
     """A group as data."""
 
-    derived_count: ClassVar[int] = 0
-    """The number of values that `derive` computes from the lengths, once before a run."""
+    shares: ClassVar[bool] = False
+    """Whether legs of it share a force by their stiffness."""
+
+    @property
+    def derived_count(self) -> int:
+        """The number of values that `derive` computes from the lengths, once before a run."""
+        return 0
 
     @property
     def bars(self) -> tuple[Bar, ...]:

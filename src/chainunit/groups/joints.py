@@ -217,6 +217,8 @@ class Placed:
     """A joint, or a drive, at one position, by the numbers of its links in the group."""
 
     __slots__ = ()
+    stiffness: Any = None
+    """of a joint whose last row yields [N/m]"""
 
     @property
     def seat(self) -> Seat | None:
@@ -240,6 +242,46 @@ class Placed:
     def slide(self, rates: Rates) -> Slide | None:
         """The motion along its line."""
         return None
+
+
+class Yielding(Placed):
+    """A `joint` of a leg that yields along the unit vector `d` by its `stiffness` [N/m]. Of its two rows of the point
+    the first one is across to `d`, over the `size` that the angle of the rod, or the way of the block, has in it; the
+    one along `d`, which has no such unknown, comes last."""
+
+    __slots__ = ("_across", "_d", "_joint", "_unknown", "stiffness")
+
+    def __init__(self, joint: Hinge, stiffness: Any, d: Vec2, size: Any = 1.0) -> None:
+        self._joint, self._d, self._across, self.stiffness = joint, d, d.turned() * (1.0 / size), stiffness
+        self._unknown = UNKNOWNS * joint._link + (3 if isinstance(joint, Guide) else 2)
+
+    @property
+    def seat(self) -> Seat | None:
+        return self._joint.seat
+
+    def rows(self) -> list[Row]:
+        """Its rows."""
+        x, y, *rest = self._joint.rows()
+        across, along = (
+            {j: v.x * x.get(j, 0.0) + v.y * y.get(j, 0.0) for j in {**x, **y}}
+            for v in (self._across, self._d)
+        )
+        across[self._unknown] = 1
+        del along[self._unknown]
+        return [across, *rest, along]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        x, y, *rest = self._joint.right(rates, before)
+        e = Vec2(x, y)
+        return [self._across.dot(e), *rest, self._d.dot(e)]
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        across, *rest, along = (next(multipliers) for _ in self._joint.rows())
+        force = self._across * across + self._d * along
+        return self._joint.force(iter([force.x, force.y, *rest]))
+
+    def slide(self, rates: Rates) -> Slide | None:
+        return self._joint.slide(rates)
 
 
 class Hinge(Placed):

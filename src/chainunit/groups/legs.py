@@ -7,6 +7,7 @@ exert on the plate. A rod pulls along its line, a block pushes across its line.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +15,7 @@ from typing import Any, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
-from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
+from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Placed, Rail, Yielding
 
 PLATE = 3
 """The number of the link at the end of the legs: after the three of a triad, or after two and another plate."""
@@ -23,7 +24,7 @@ PLATE = 3
 class LegAt(NamedTuple):
     """A leg at one pose: its `row`, the `gap` by which it misses, in the unit of the row, a `spot` of the plate
     through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer
-    joint and the one with the plate."""
+    joint and the one with the plate; the `stiffness` of one that yields [N/m]."""
 
     row: Sequence[Any]
     gap: Any
@@ -32,6 +33,25 @@ class LegAt(NamedTuple):
     pose: tuple[Vec2 | Motion, Vec2]
     outer: Hinge | Guide
     inner: Hinge | Guide
+    stiffness: Any = None
+
+    @property
+    def weight(self) -> Any:
+        """Of the square of its gap in the strain energy."""
+        return self.stiffness if self.length is None else self.stiffness / (self.length * self.length)
+
+    @property
+    def joints(self) -> tuple[Placed, Placed]:
+        """Its outer joint and the one with the plate. A rod that yields does so in the pin with the plate, a block
+        across its guide."""
+        outer, inner, k, (_, d) = self.outer, self.inner, self.stiffness, self.pose
+        if k is None:
+            return outer, inner
+        if self.length is not None:
+            return outer, Yielding(inner, k, d, self.length)
+        if isinstance(outer, Guide):
+            return Yielding(outer, k, d.turned()), inner
+        return outer, Yielding(inner, k, d.turned())
 
     def between(self, origin: Vec2, other: int, row: Sequence[Any]) -> LegAt:
         """The leg with this row from the link `other` of its group, at `origin`, in place of a link before that."""
@@ -39,14 +59,20 @@ class LegAt(NamedTuple):
         start = start.p if isinstance(start, Motion) else start
         return self._replace(row=row, pose=(start, d), outer=self.outer.held_by(other, start - origin))
 
+    @property
+    def shortness(self) -> float:
+        """By how much it is too short, in numbers [m]."""
+        l = self.length
+        return -self.gap if l is None else math.sqrt(l * l - 2.0 * self.gap) - l
+
     def misfit(self, xp: Any) -> Any:
         """The gap in size, of a rod in parts of its length [1], of a block [m]."""
         l = self.length
         return xp.abs(self.gap if l is None else xp.sqrt(l * l - 2.0 * self.gap) / l - 1.0)
 
 
-PlacedLeg = Callable[[Vec2, Vec2], LegAt]
-"""A leg with the linkage before it, for any origin and axis of the plate."""
+PlacedLeg = Callable[..., LegAt]
+"""A leg with the linkage before it, for any origin and axis of the plate, and its number."""
 
 
 @dataclass
@@ -123,25 +149,29 @@ def rods_at(outer: Sequence[Motion], lengths: Sequence[Any], arms: Sequence[Vec2
     return [partial(_rod, k, *rod) for k, rod in enumerate(zip(outer, lengths, arms, strict=True))]
 
 
-def _rod(number: int, outer: Motion, length: Any, arm: Vec2, origin: Vec2, u: Vec2) -> LegAt:
+def _rod(
+    number: int, outer: Motion, length: Any, arm: Vec2, origin: Vec2, u: Vec2, plate: int = PLATE
+) -> LegAt:
     a = _turned(arm, u)
     r = origin + a - outer.p
     gap = 0.5 * (length * length - r.squared())
-    joints = Hinge(number, base=outer), Hinge(number, r, PLATE, a)
+    joints = Hinge(number, base=outer), Hinge(number, r, plate, a)
     return LegAt((r.x, r.y, a.cross(r)), gap, a, length, (outer, r * (1.0 / length)), *joints)
 
 
-def _block(number: int, rail: Link, arm: Vec2, origin: Vec2, u: Vec2) -> LegAt:
+def _block(number: int, rail: Link, arm: Vec2, origin: Vec2, u: Vec2, plate: int = PLATE) -> LegAt:
     a, d, n = _turned(arm, u), rail.u, rail.u.turned()
     way = origin + a - rail.pin.p
-    joints = Guide(number, d, way.dot(d), way, rail), Hinge(number, ZERO, PLATE, a)
+    joints = Guide(number, d, way.dot(d), way, rail), Hinge(number, ZERO, plate, a)
     return LegAt((n.x, n.y, a.cross(n)), -way.dot(n), a, None, (rail.pin.p + way, d), *joints)
 
 
-def _slot(number: int, outer: Motion, point: Vec2, along: Vec2, origin: Vec2, u: Vec2) -> LegAt:
+def _slot(
+    number: int, outer: Motion, point: Vec2, along: Vec2, origin: Vec2, u: Vec2, plate: int = PLATE
+) -> LegAt:
     d, a, y = _turned(along, u), _turned(point, u), outer.p - origin
     n = d.turned()
-    joints = Hinge(number, base=outer), Guide(number, d, (y - a).dot(d), y, PLATE)
+    joints = Hinge(number, base=outer), Guide(number, d, (y - a).dot(d), y, plate)
     return LegAt((n.x, n.y, y.cross(n)), (y - a).dot(n), a, None, (outer, d), *joints)
 
 

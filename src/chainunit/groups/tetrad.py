@@ -4,6 +4,11 @@ A plate turns about a pin that moves in a known way, or slides along a rail: its
 the group. The legs go from the first plate to the second one, as those of a triad go from the links before it to the
 ternary link: with two pins, or with a pin and a slot in either plate. Each leg gives a row: what its wrench does
 along both coordinates. Their determinant vanishes if the lines of the legs meet on the line of the outer pins.
+
+A plate may also stand on more legs than it has coordinates: on two or more while a pin or a rail holds it, on four or
+more alone. It moves as one of rigid links, as each leg fits all the way. Its legs share the force with the least
+strain energy (Menabrea), each with one spring: of a rod along it, in its pin with the plate, of a block across its
+guide.
 """
 
 from __future__ import annotations
@@ -15,9 +20,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
-from .followed import TERMS, USUAL, FollowedGroup, SolvedOnLegs, Tracking
+from .followed import USUAL, FollowedGroup, SolvedOnLegs, Tracking
 from .joints import Guide, GuideData, Hinge, HingeData, Joint, JointData, LinkageInMotion, Rail, Slide
-from .legs import PLATE, Leg, LegAt
+from .legs import PLATE, Leg, LegAt, PlacedLeg
 
 
 class Plate(NamedTuple):
@@ -34,7 +39,7 @@ class Plate(NamedTuple):
         return rail.at_position(linkage.links) if isinstance(rail, Rail) else linkage.pins[self.joint.pin]
 
 
-class _PlateAt(NamedTuple):
+class PlateAt(NamedTuple):
     """A plate at one coordinate: its origin and the direction of its x axis, whether it turns, and as a link its pose
     and its outer joint."""
 
@@ -49,16 +54,19 @@ class _PlateAt(NamedTuple):
         return moment if self.turns else force.dot(self.u)
 
 
-def _plates_at(xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> Iterator[_PlateAt]:
-    """The plates at the coordinates `x`, from the pin or the rail that holds each of them."""
-    for number, (base, place) in enumerate(zip(placed, x, strict=True), PLATE - 1):
+def plates_at(
+    xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any], number: int = PLATE - 1
+) -> Iterator[PlateAt]:
+    """The plates at the coordinates `x`, from the pin or the rail that holds each of them; `number` is that of the
+    first one in the group."""
+    for k, (base, place) in enumerate(zip(placed, x, strict=True), number):
         if isinstance(base, Motion):
             u = Vec2(xp.cos(place), xp.sin(place))
-            yield _PlateAt(base.p, u, True, (base, u), Hinge(number, base=base))
+            yield PlateAt(base.p, u, True, (base, u), Hinge(k, base=base))
         else:
             d, way = base.u, base.u * place
             origin = base.pin.p + way
-            yield _PlateAt(origin, d, False, (origin, d), Guide(number, d, place, way, base))
+            yield PlateAt(origin, d, False, (origin, d), Guide(k, d, place, way, base))
 
 
 class _FirstPlate(NamedTuple):
@@ -75,7 +83,6 @@ class Tetrad(FollowedGroup):
     near those of its assembly mode, see `FollowedGroup`."""
 
     kind: ClassVar[str] = "tetrad"
-    derived_count: ClassVar[int] = 2 * TERMS + 2
 
     name: str
     plates: tuple[Plate, Plate]
@@ -83,6 +90,7 @@ class Tetrad(FollowedGroup):
     assembly: tuple[Any, Any]
     start: float = 0.0
     tracking: Tracking = USUAL
+    span: Sequence[float] = ()
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -101,9 +109,9 @@ class Tetrad(FollowedGroup):
 
     def legs_at(self, xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> list[LegAt]:
         """See `FollowedGroup`."""
-        return self._legs(*_plates_at(xp, placed, x))
+        return self._legs(*plates_at(xp, placed, x))
 
-    def _legs(self, first: _PlateAt, second: _PlateAt) -> list[LegAt]:
+    def _legs(self, first: PlateAt, second: PlateAt) -> list[LegAt]:
         """The legs between the plates, with their rows."""
         data, link, legs = self.plates[0], Link(Motion(first.origin), first.u, 0.0, 0.0), []
         pins = {name: link.beside(arm.x, arm.y) for name, arm in data.pins.items()}
@@ -117,10 +125,80 @@ class Tetrad(FollowedGroup):
 
     def solved(self, xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> SolvedOnLegs:
         """See `FollowedGroup`."""
-        first, second = plates = [*_plates_at(xp, placed, x)]
+        first, second = plates = [*plates_at(xp, placed, x)]
         legs = self._legs(first, second)
         starts = [start for start, _ in (leg.pose for leg in legs) if isinstance(start, Vec2)]
         ends = [start - first.origin for start in starts], [leg.spot for leg in legs]
         spots = [[ZERO, *end] for plate, end in zip(plates, ends, strict=True) if plate.turns]
         held = [plate.joint for plate in plates]
         return SolvedOnLegs(xp, legs, spots, [plate.pose for plate in plates], held)
+
+
+class _Placed(NamedTuple):
+    """The legs for any pose of the plate, and the pin or the rail that holds this, if one does."""
+
+    legs: Sequence[PlacedLeg]
+    base: Motion | Link | None
+
+
+@dataclass
+class SharedPlate(FollowedGroup):
+    """A plate on legs as data: what holds it besides (`held`), its bar, the legs with the `stiffness` of each [N/m],
+    and coordinates near those of its assembly mode, see `FollowedGroup`: its angle or its way, or its pose."""
+
+    kind: ClassVar[str] = "shared plate"
+    shares: ClassVar[bool] = True
+
+    name: str
+    held: Plate | None
+    plate: Bar
+    legs: Sequence[Leg]
+    stiffness: Sequence[Any]
+    assembly: Sequence[Any]
+    start: float = 0.0
+    tracking: Tracking = USUAL
+    span: Sequence[float] = ()
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """Its links, the plate last."""
+        return *(leg.bar for leg in self.legs), self.plate
+
+    @property
+    def joints(self) -> tuple[JointData, ...]:
+        outer, inner = zip(*(leg.joints(self.name) for leg in self.legs), strict=True)
+        return *([self.held.joint] if self.held else []), *outer, *inner
+
+    def at_position(self, linkage: LinkageInMotion) -> _Placed:
+        """See `FollowedGroup`."""
+        legs = [leg.at_position(k, linkage) for k, leg in enumerate(self.legs)]
+        return _Placed(legs, self.held and self.held.at_position(linkage))
+
+    def _at(self, xp: Any, placed: _Placed, x: Sequence[Any]) -> tuple[PlateAt | None, Vec2, list[LegAt]]:
+        """The plate at its coordinate, if it is held, its direction, and its legs."""
+        count, plate, legs = len(self.legs), None, []
+        if placed.base is None:
+            origin, u = Vec2(x[0], x[1]), Vec2(xp.cos(x[2]), xp.sin(x[2]))
+        else:
+            plate = next(plates_at(xp, [placed.base], x, count))
+            origin, u = plate.origin, plate.u
+        for leg, stiffness in zip(placed.legs, self.stiffness, strict=True):
+            here = leg(origin, u, count)
+            (fx, fy, moment), (start, _) = here.row, here.pose
+            row = here.row if plate is None else [plate.along(Vec2(fx, fy), moment)]
+            # a slot goes on to the pin of its block
+            spot = start.p - origin if here.length is None and isinstance(start, Motion) else here.spot
+            legs.append(here._replace(row=row, spot=spot, stiffness=stiffness))
+        return plate, u, legs
+
+    def legs_at(self, xp: Any, placed: _Placed, x: Sequence[Any]) -> list[LegAt]:
+        """See `FollowedGroup`."""
+        return self._at(xp, placed, x)[2]
+
+    def solved(self, xp: Any, placed: _Placed, x: Sequence[Any]) -> SolvedOnLegs:
+        """See `FollowedGroup`."""
+        plate, u, legs = self._at(xp, placed, x)
+        spots = [leg.spot for leg in legs]
+        if plate is None:
+            return SolvedOnLegs(xp, legs, [spots], [(Vec2(x[0], x[1]), u)])
+        return SolvedOnLegs(xp, legs, [[ZERO, *spots]] if plate.turns else [], [plate.pose], [plate.joint])

@@ -29,7 +29,7 @@ from ..core.engines import MATH
 from ..core.model import Requirement
 from ..core.planar import Motion, Vec2
 from .body import Bar, Mass
-from .followed import MOST_MISFIT, TERMS, USUAL, FollowedGroup, SolvedOnLegs, Tracking, corrected
+from .followed import MOST_MISFIT, USUAL, FollowedGroup, SolvedOnLegs, Tracking, corrected
 from .joints import JointData, LinkageInMotion
 from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
@@ -67,7 +67,6 @@ class Triad(FollowedGroup):
     coordinates are the pose, see `FollowedGroup`."""
 
     kind: ClassVar[str] = "triad"
-    derived_count: ClassVar[int] = 3 * TERMS + 2
 
     name: str
     mass: Mass
@@ -76,6 +75,7 @@ class Triad(FollowedGroup):
     assembly: Pose
     start: float = 0.0
     tracking: Tracking = USUAL
+    span: Sequence[float] = ()
 
     @property
     def bars(self) -> tuple[Bar, ...]:

@@ -26,6 +26,14 @@ class FreeLinksError(InputError):
     """Links of a linkage can move by themselves."""
 
 
+class FixedLinksError(InputError):
+    """The `links` of a linkage are fixed more than once."""
+
+    def __init__(self, message: str, links: Sequence[str], key: str) -> None:
+        super().__init__(message, key)
+        self.links = links
+
+
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
     contain. `alone` is the kind of the group that a single link forms by it and a joint of the kinds `seats`. One
@@ -58,8 +66,10 @@ class AssurGroup(NamedTuple):
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
     the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
     stand first, then its legs; the joints are the outer ones, then the joints of the legs with the first link and
-    with the second. Of a single link the pin or the guide stands first. Of a driver between two links these stand
-    first, then the lever; the joints are as of a dyad, and the one of the driver is the last.
+    with the second. Of a plate that legs share it stands first; the joints are the one that holds it besides, if one
+    does, then the outer ones of the legs, then their inner ones. Of a single link the pin or the guide stands first.
+    Of a driver between two links these stand first, then the lever; the joints are as of a dyad, and the one of the
+    driver is the last.
     """
 
     kind: str
@@ -79,7 +89,7 @@ def decompose(
         for a linkage with too many or too few degrees of freedom, or with a group of a class that is not covered, in
         one line that names the links and the joints.
     """
-    by_name, first = {joint.name: joint for joint in joints}, next(iter(drivers))
+    by_name, first, every = {joint.name: joint for joint in joints}, next(iter(drivers)), joints
     grounded = {name: link for name, link in drivers.items() if GROUND in by_name[name].links}
     alone = [
         AssurGroup(DRIVER, (link,), (by_name[name],)) for name, link in grounded.items() if name != first
@@ -88,7 +98,10 @@ def decompose(
         j._replace(equations=_DRIVEN) if j.name in drivers else j for j in joints if j.name not in grounded
     ]
     unknown = [link for link in links if link not in grounded.values()]
-    matched = _matching(dict.fromkeys(unknown, 3), joints)
+    try:
+        matched = _matching(dict.fromkeys(unknown, 3), joints)
+    except FixedLinksError as fault:
+        return _with_redundant_leg(links, every, drivers, fault)
     free = {link: 3 - sum(1 for matched_link in matched.values() if matched_link == link) for link in unknown}
     if any(free.values()):
         raise _freedoms(unknown, joints, matched, free)
@@ -189,13 +202,79 @@ def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[
             if not augment((k, number), seen):
                 involved = sorted(seen) or [joints[k].on]
                 fixing = [j.name for j in joints if {*j.links} & {*involved}]
-                raise InputError(
+                raise FixedLinksError(
                     f"too few degrees of freedom: the joints {', '.join(fixing)} fix the link"
-                    f"{'s' * (len(involved) > 1)} {', '.join(involved)} more than once; take out a joint, such as "
-                    f"{joints[k].name}, or add a link between",
-                    key=involved[0],
+                    f"{'s' * (len(involved) > 1)} {', '.join(involved)} more than once",
+                    involved,
+                    involved[0],
                 )
     return matched
+
+
+def _with_redundant_leg(
+    links: Sequence[str], joints: Sequence[JointOf], drivers: Mapping[str, str], fault: FixedLinksError
+) -> list[AssurGroup]:
+    """The groups of a linkage that is fixed more than once, by a leg that can be left out: those without it, of which
+    one has the plate that the leg holds, too.
+
+    Raises
+    ------
+    FixedLinksError
+        the `fault`, if there is no such leg.
+    """
+    for leg in fault.links:
+        ends = [joint for joint in joints if leg in joint.links]
+        if len(ends) != 2 or any(joint.kind not in _LETTERS or joint.name in drivers for joint in ends):
+            continue
+        try:
+            others = [link for link in links if link != leg]
+            groups = decompose(others, [joint for joint in joints if joint not in ends], drivers)
+        except InputError:
+            continue
+        places = {link: k for k, group in enumerate(groups) for link in group.links}
+        (before, outer), (k, inner) = sorted((places.get(j.other_link(leg), -1), j) for j in ends)
+        if k > before and (shared := _shared(groups[k], inner.other_link(leg), leg, outer, inner)):
+            groups[k] = shared
+            return groups
+    raise fault
+
+
+def _shared(group: AssurGroup, plate: str, leg: str, outer: JointOf, inner: JointOf) -> AssurGroup | None:
+    """A group whose `plate` stands on one leg more; None if it is none of its plates, or slides in the leg."""
+    if group.kind in DYADS:
+        (first, second), (p, b, q) = group.links, group.joints
+        held, legs, ends = ([p], [second], [q, b]) if plate == first else ([q], [first], [p, b])
+    elif group.kind in (TRIAD, SHARED) and plate == group.links[0]:
+        legs = [*group.links[1:]]
+        held, ends = [*group.joints[: -2 * len(legs)]], [*group.joints[-2 * len(legs) :]]
+    else:
+        return None
+    near, far = [*ends[: len(legs)], outer], [*ends[len(legs) :], inner]
+    if any(one.kind == other.kind == PRISMATIC for one, other in zip(near, far, strict=True)):
+        return None
+    return AssurGroup(SHARED, (plate, *legs, leg), (*held, *near, *far))
+
+
+def check_stiffness(groups: Sequence[AssurGroup], stiff: Sequence[str]) -> None:
+    """Refuse a leg without a stiffness that shares the force of a plate, and a link that is `stiff` for no use.
+
+    Raises
+    ------
+    FixedLinksError, InputError
+        in one line; its key is the name of the link.
+    """
+    sharing = {leg: group for group in groups if group.kind == SHARED for leg in group.links[1:]}
+    if missing := [leg for leg in sharing if leg not in stiff]:
+        plate, *legs = sharing[missing[0]].links
+        raise FixedLinksError(
+            f"{', '.join(legs)} hold {plate} more often than needed and share its force: give each of them a "
+            'stiffness, such as stiffness = "50 kN/mm"; that of a rod is k = E A / L',
+            legs,
+            missing[0],
+        )
+    if unused := [link for link in stiff if link not in sharing]:
+        legs = [f"here of {', '.join(sharing)}" if sharing else "and here there is none"]
+        raise InputError(f"a stiffness counts only of a redundant leg, {legs[0]}; leave it out", unused[0])
 
 
 def _freedoms(
@@ -364,8 +443,11 @@ DRIVER, CYLINDER, ELBOW = DRIVES = "driver", "cylinder", "elbow"
 of a cylinder that is pinned at both ends, and of two arms with a motor between, with the lever that they swing."""
 _DRIVEN = 3
 """Number of equations of a joint that a driver moves."""
-TRIAD, TETRAD = ON_LEGS = "triad", "tetrad"
-"""Kinds of groups of which links stand on legs, without a closed form."""
+TRIAD, TETRAD, SHARED = ON_LEGS = "triad", "tetrad", "shared plate"
+"""Kinds of groups of which links stand on legs, without a closed form; the legs of the last one are more than needed,
+and share the force."""
+GROUPS = (*DYADS, *ON_LEGS, CYLINDER, ELBOW)
+"""Kinds that a file may list, besides single links."""
 
 
 def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -> AssurGroup:

@@ -400,7 +400,13 @@ class MachineState:
         gives the slopes of the reactions and of the torque. For the derivative by the angle the present reactions add
         moments, as their arms turn.
         """
-        return self._by_angle(), self._by_speed()
+        m = self.m
+        if not any(group.shares for group in m.linkage.groups):
+            return self._by_angle(), self._by_speed()
+        # a force that legs share depends on how these turn, too
+        xp = dual(self._xp)
+        moved = Mechanism(xp, m.linkage, Dual(m.q, 1.0), m.derived, m.topology)
+        return slope(MachineState(xp, moved, self.w, self._loads).bias), self._by_speed()
 
     def _by_angle(self) -> Any:
         """The slope over the place of the first driver, which the further ones follow."""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core.errors import InputError
-from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FixedLinksError, FreeLinksError, check_stiffness
 from ...mechanism.expressions import CONSTANTS, WORDS
 from .declarations import RESERVED
 from .entries import Places
@@ -84,12 +84,19 @@ def freedom_faults(
     drivers: Entries,
 ) -> Iterator[Fault]:
     """Too many or too few degrees of freedom, and groups of a class that is not covered. Too many may come from a
-    name of a point that is not spelled as that of the pin that it was meant to be."""
+    name of a point that is not spelled as that of the pin that it was meant to be.
+
+    Raises
+    ------
+    FixedLinksError
+        for links that are fixed more than once.
+    """
     names = [link["name"] for link in links]
     try:
-        groups_of(
-            names, [JointEntry.from_table(j) for j in joints], [DriverEntry(**driver) for driver in drivers]
-        )
+        entries = [JointEntry.from_table(j) for j in joints], [DriverEntry(**driver) for driver in drivers]
+        check_stiffness(groups_of(names, *entries), [link["name"] for link in links if "stiffness" in link])
+    except FixedLinksError:
+        raise
     except InputError as error:
         used = {tuple(entry[end]) for entry in (*joints, *loads) for end in ("on", "by") if end in entry}
         used |= {(joint["by"][0], joint["toward"]) for joint in joints if "toward" in joint}

@@ -12,7 +12,7 @@ from ...core.planar import Vec2
 from ...groups.driver import Cylinder, Elbow
 from ...groups.dyad import RRP, Dyad
 from ...groups.group import Group
-from ...mechanism.assur import AssurGroup
+from ...mechanism.assur import REVOLUTE, SHARED, AssurGroup
 from ...mechanism.machine import Mechanism
 from ..admissible import rounded_inward
 from .joint_kinds import SINGLES
@@ -35,6 +35,7 @@ _DEAD = {
     "cylinder": f"the cylinder and {{2}} are in line{_MEET}",
     "elbow": f"its outer pins and that of {{1}} with {{2}} are in line{_MEET}",
     "triad": "the lines of its three legs meet in one point or are parallel",
+    "shared plate": "the lines of its legs meet in one point or are parallel, and none of them holds {0}",
     "tetrad": "the lines of {2} and {3} meet on that of its outer pins, or all are parallel",
 }
 """What holds in the dead position of a group, by its kind and with its links."""
@@ -47,10 +48,33 @@ def dead_group(group: AssurGroup, where: str, margin: float) -> InputError:
         return InputError(SINGLES[group.kind].dead(group, where), key)
     reason = _DEAD[group.kind].format(*group.links)
     size = f"{margin:.1g}" if margin > _NO_MARGIN else "0"
+    remedy = "change its lengths"
+    if group.kind == SHARED:
+        remedy = "change its lengths, or let the driver swing by a range without this place"
+        if len(group.joints) % 2 and group.joints[0].kind == REVOLUTE:
+            reason = (
+                f"the lines of {' and '.join(group.links[1:])} go through the pin {group.joints[0].name} of "
+                f"{group.links[0]}, as of cranks that all stand in line with their rod"
+            )
+            remedy = (
+                "couple each crank with the next one by two rods, on pins at 90 deg to each other, or let the driver "
+                "swing by a range without this place"
+            )
     return InputError(
         f"the group of {', '.join(group.links)} comes to a dead position at {where}: there {reason}, so that its "
-        f"forces have no limit (its margin is {size} and must be > {LEAST_MARGIN:g}); change its lengths",
+        f"forces have no limit (its margin is {size} and must be > {LEAST_MARGIN:g}); {remedy}",
         key=key,
+    )
+
+
+def misfit_of_leg(group: AssurGroup, number: int, gap: float, where: str) -> InputError:
+    """The refusal of a plate on redundant legs of which this one does not fit, by its `gap` at the worst place."""
+    leg, state = group.links[1 + number], "short" if gap > 0.0 else "long"
+    return InputError(
+        f"the legs {', '.join(group.links[1:])} do not fit {group.links[0]} all the way: at {where} {leg} is "
+        f"{_mm(abs(gap))} too {state}, if the others fit; correct the places of its points, or of the others, in all "
+        "their digits",
+        key=f"links.{leg}",
     )
 
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
 from ...core.inputs import TOML, file_text
-from ...mechanism.assur import CYLINDER, DYADS, ELBOW, FURTHER_DRIVERS, GROUND, ON_LEGS, PRISMATIC, REVOLUTE
+from ...mechanism.assur import FURTHER_DRIVERS, GROUND, GROUPS, PRISMATIC, REVOLUTE, FixedLinksError
 from ...mechanism.curves import TableCurve
 from ...mechanism.expressions import LawCourse, splines, value_of
 from ...mechanism.models import InverseMachine
@@ -47,7 +47,7 @@ TABLES = (
     "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "drivers",
     "links", "joints", "loads", "pins", "guides", "cams", "start", "groups",
 )  # fmt: skip
-_LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
+_LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar", "stiffness")
 _LAW_PLACES = 96
 """Places of the first driver at which a law is checked."""
 _LARGEST_START = 1e4
@@ -192,16 +192,29 @@ class _LinkageReader(LoadReader):
         self.all(quantity_names(names, links))
         self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
         self.refuse()
-        self.all(freedom_faults(self.points, links, joints, loads, [driver, *drivers]))
+        fixed = None
+        try:
+            self.all(freedom_faults(self.points, links, joints, loads, [driver, *drivers]))
+        except FixedLinksError as fault:
+            fixed = fault
         owned = [
             {"name": f"{quantity}_of_{link['name']}", "value": x}
             for link in links
             for quantity, x in link["own"].items()
         ]
         values = self.start_values([*parameters, *inputs, *owned])
+        for link in links:
+            if isinstance(text := link.get("stiffness"), str) and value_of(MATH, text, values) <= 0.0:
+                self.fault(
+                    f"links.{link['name']}.stiffness", f"is {shown(text)}, which is not > 0 at the start"
+                )
         self.refuse()
-        start = self.start(values, links, joints, driver, span, drivers, tables)
-        self.refuse()
+        try:
+            start = self.start(values, links, joints, driver, span, drivers, tables)
+            self.refuse()
+        except InputError:
+            self.fixed_fault(fixed)
+            self.refuse()
         for joint in joints:
             for carrier, points in joint.pop("points", {}).items():
                 self.points[carrier] |= points
@@ -223,7 +236,28 @@ class _LinkageReader(LoadReader):
             "start": start,
         }
         more = {"derived": [*self.derived.items()], "losses": losses, "drivers": drivers}
+        self.fixed_fault(fixed, described)
+        self.refuse()
         return described | {key: entries for key, entries in more.items() if entries}
+
+    def fixed_fault(self, fault: FixedLinksError | None, described: Mapping[str, Any] | None = None) -> None:
+        """Fault links that are fixed more than once, with a joint or one of them without which the linkage as
+        `described` closes over the way, clear of dead positions, as tried."""
+        if fault is None:
+            return
+        parts = {name: f"the joint {name}" for name in self.table("joints")}
+        parts |= {link: f"the link {link}" for link in fault.links}
+        hint = "as tried, the linkage does not work without any one of its links or joints alone"
+        for name, what in parts.items() if described else ():
+            rest = dict(described or {}, loads=[], groups=[])
+            rest["links"] = [link for link in rest["links"] if link["name"] != name]
+            rest["joints"] = [j for j in rest["joints"] if name not in (j["name"], j["on"][0], j["by"][0])]
+            # a gear may need what is left out
+            with suppress(InputError, KeyError):
+                check_start(machine_of(rest).described_by)  # type: ignore[attr-defined]
+                hint = f"without {what} the linkage closes all the way, clear of dead positions"
+                break
+        self.fault(f"links.{fault.key}", f"{fault}; {hint}" if described else str(fault))
 
     def fault_drivers(self) -> None:
         """Fault a list of drivers; the reader goes on with the first one."""
@@ -239,7 +273,7 @@ class _LinkageReader(LoadReader):
         if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
             self.fault("groups", f"is {shown(tables)}; must be tables [[groups]] with kind and links")
             return []
-        kinds = (*DYADS, *ON_LEGS, CYLINDER, ELBOW, *SINGLES)
+        kinds = (*GROUPS, *SINGLES)
         for k, table in enumerate(tables, 1):
             key, kind, links = f"groups.{k}", table.get("kind", ""), table.get("links")
             self.keys(key, table, ("kind", "links"))
@@ -291,6 +325,10 @@ class _LinkageReader(LoadReader):
                         link["own"][quantity], link[quantity] = value, f"{quantity}_of_{name}"
             if "centroid" in table:
                 link["centroid"] = self.vector(f"{key}.centroid", table["centroid"], "m")
+        if "stiffness" in table:
+            stiffness = link["stiffness"] = self.entry(f"{key}.stiffness", table["stiffness"], "N/m")
+            if not isinstance(stiffness, str) and stiffness <= 0.0:
+                self.fault(f"{key}.stiffness", f"is {shown(table['stiffness'])}; must be > 0")
         masses = self.table(f"{key}.masses", table)
         for point in masses:
             if point not in points:

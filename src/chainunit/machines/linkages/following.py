@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...groups.followed import MOST_MISFIT, FollowedGroup, Tracking
+from ...groups.followed import MOST_MISFIT, STEPS, FollowedGroup, Tracking, corrected
+from ...groups.tetrad import SharedPlate
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
-from .closing import LEAST_MARGIN, dead_group, open_group
+from .closing import LEAST_MARGIN, dead_group, misfit_of_leg, open_group
 from .outputs import DescribedLinkage
 from .structure import FOLLOWED, Structure
 from .way import WHOLE, DriverWay
@@ -91,7 +92,7 @@ class FollowedLinkage:
         angles = {name: [angle] for name, angle in (near or poses).items()}
         margins = self.margins = []
         try:
-            check_followed(self.linkage, self.derived)
+            self._check_followed()
             for q in places:
                 m = self.at(q)
                 self.signs = self.signs or signs_of(m.margins())
@@ -137,8 +138,58 @@ class FollowedLinkage:
         low, high = self.way.span
         places = [q, *(low + (high - low) * n / _PLACES for n in range(_PLACES + 1))]
         group = (self.linkage.driver, *self.linkage.groups)[k + 1 - self._drivers]
+        if isinstance(group, SharedPlate) and (fault := self._fault_of_shared(k, group, places[1:])):
+            return fault
         where, ground = self.way.words(q), self.linkage.ground
         return open_group(self.structure.groups[k], where, group, ground, self._before(k), places)
+
+    def _fault_of_shared(self, k: int, plate: SharedPlate, places: Sequence[float]) -> InputError | None:
+        """The refusal of the group `k` of the structure, a plate on redundant legs: by its first dead position on the
+        way from the start, or one before it, or else by the leg that fits least; None if it has no such fault."""
+        before, signs, worst = self._before(k), list[float](), (0.0, 0.0, 0, plate.start)
+        for way in ([q for q in places if q >= plate.start], [q for q in places[::-1] if q < plate.start]):
+            near, last, last_q = plate.assembly, list[float](), plate.start
+            for q in (plate.start, *way):
+                try:
+                    m = before(q)
+                except (ArithmeticError, ValueError, IndexError):
+                    n = self._open_at(q)
+                    return None if n is None or n >= k else self._open_group(n, q)
+                signs = signs or signs_of(m.margins())
+                margins, fit = signed(m.margins(), signs), None
+                with suppress(ArithmeticError, ValueError):
+                    placed = plate.at_position(m)
+                    near = corrected(partial(plate.legs_at, MATH, placed), near, 2 * STEPS)
+                    group = plate.solved(MATH, placed, near)
+                    margins, fit = [*margins, group.hold], group.least_fit()
+                margins += [0.0] * (fit is None)
+                for n, (margin, before_it) in enumerate(zip(margins, last or margins, strict=True)):
+                    # it falls evenly to a dead position, at the next place or before it
+                    if not min(margin, 2.0 * margin - before_it) > LEAST_MARGIN:
+                        ahead = (q - last_q) * margin / (before_it - margin) if last else 0.0
+                        return dead_group(self.structure.groups[n], self.way.words(q + ahead), 0.0)
+                last, last_q = margins, q
+                worst = max(worst, (*(fit or (0.0, 0.0, 0)), q))
+        part, gap, leg, q = worst
+        if not part > MOST_MISFIT:
+            return None
+        return misfit_of_leg(self.structure.groups[k], leg, gap, self.way.words(q))
+
+    def _check_followed(self) -> None:
+        """Refuse groups on legs that cannot be followed all the way."""
+        for group, misfit in misfits(self.linkage, self.derived):
+            if misfit <= MOST_MISFIT:
+                continue
+            k = self.linkage.groups.index(group) + self._drivers
+            if isinstance(group, SharedPlate):
+                raise self._open_group(k, self.way.start)
+            bars, legs = group.bars, len(group.legs)
+            links = ", ".join(bar.name for bar in (*bars[legs:], *bars[:legs]))
+            raise InputError(
+                f"the {group.kind} of {links} does not close all the way round, or moves too sharply to be "
+                "followed: change its lengths",
+                key=f"links.{group.name}",
+            )
 
     def _open_at(self, q: float) -> int | None:
         """The number of the first group of the structure that does not close at a place; None if all close."""
@@ -164,10 +215,7 @@ class FollowedLinkage:
         there is none, or if the driver has to go all the way round."""
         if any(group.kind in FOLLOWED for group in self.structure.groups):
             return ""
-        # the start of a slide may lie outside its range
-        low, high = self.way.limits or (-math.inf, math.inf)
-        start = min(max(self.way.start, low), high)
-        ends = self.closing_range(start)
+        ends = self.closing_range(self.way.start)
         if ends is None:
             return ""
         unit = "m" if self.way.linear else "deg"
@@ -176,9 +224,8 @@ class FollowedLinkage:
             for end, sense in zip(ends, (1.0, -1.0), strict=True)
         )
         low_group, high_group = (f" (group of {', '.join(end.links)})" if end.links else "" for end in ends)
-        around = "its start" if start == self.way.start else self.way.words(start)
         return (
-            f"; around {around} the linkage closes from {least}{low_group} to {most}{high_group}: "
+            f"; around its start the linkage closes from {least}{low_group} to {most}{high_group}: "
             f"{'for a driver that swings, ' if self.way.turns else ''}write "
             f'range = ["{least}", "{most}"] in [driver], or less, as the forces grow without limit towards such an '
             "end"
@@ -311,16 +358,3 @@ def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[Followed
         last += group.derived_count
         if isinstance(group, FollowedGroup):
             yield group, derived[last - 2]
-
-
-def check_followed(linkage: Linkage, derived: Sequence[Any]) -> None:
-    """Refuse triads and tetrads that cannot be followed all the way round."""
-    for group, misfit in misfits(linkage, derived):
-        if not misfit <= MOST_MISFIT:
-            bars, legs = group.bars, len(group.legs)
-            links = ", ".join(bar.name for bar in (*bars[legs:], *bars[:legs]))
-            raise InputError(
-                f"the {group.kind} of {links} does not close all the way round, or moves too sharply to be "
-                "followed: change its lengths",
-                key=f"links.{group.name}",
-            )

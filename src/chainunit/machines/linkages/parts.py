@@ -14,9 +14,9 @@ from ...groups.followed import USUAL
 from ...groups.group import Group
 from ...groups.joints import GuideData, HingeData, Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
-from ...groups.tetrad import Plate, Tetrad
+from ...groups.tetrad import Plate, SharedPlate, Tetrad
 from ...groups.triad import Pose, Triad
-from ...mechanism.assur import CYLINDER, DRIVER, ELBOW, GROUND, REVOLUTE, TETRAD, TRIAD, AssurGroup
+from ...mechanism.assur import CYLINDER, DRIVER, ELBOW, GROUND, REVOLUTE, SHARED, TETRAD, TRIAD, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
@@ -203,6 +203,8 @@ class LinkageParts:
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
         if group.kind == TETRAD:
             return self._tetrad(group.links, joints)
+        if group.kind == SHARED:
+            return self._shared(group.links[0], group.links[1:], joints)
         if group.kind in SINGLES:
             return SINGLES[group.kind].group(self, group.links[0], *joints)
         build: Callable[..., Group] = {
@@ -283,6 +285,24 @@ class LinkageParts:
             Pose(*self.structure.poses[ternary]),
             self.structure.start,
             self.sides.get(ternary, USUAL),
+            self.structure.span,
+        )
+
+    def _shared(self, name: str, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
+        """A plate on legs that share its force, and the joint that holds it besides, if one does."""
+        count = len(links)
+        outer, inner = joints[-2 * count : -count], joints[-count:]
+        held, x = None, [*self.structure.poses[name]]
+        if len(joints) > 2 * count:
+            held, *x = self._plate(name, joints[0], inner)
+        else:
+            self._carriers |= {self.pin(name, j.at(name)): name for j in inner if j.kind == REVOLUTE}
+        bar = held.bar if held else self.bar(name, OWN)
+        legs = [self._leg(*ends, name) for ends in zip(links, outer, inner, strict=True)]
+        stiffness = [self.geometry.number(self.structure.links[link].stiffness) for link in links]
+        tracking = self.sides.get(name, USUAL)
+        return SharedPlate(
+            name, held, bar, legs, stiffness, x, self.structure.start, tracking, self.structure.span
         )
 
     def _tetrad(self, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
@@ -292,7 +312,7 @@ class LinkageParts:
         second, x2 = self._plate(links[1], joints[1], joints[4:])
         one, other = (self._leg(links[k], joints[k], joints[k + 2], links[1]) for k in (2, 3))
         tracking = self.sides.get(links[0], USUAL)
-        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, tracking)
+        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, tracking, self.structure.span)
 
     def _plate(self, link: str, outer: JointEntry, inner: Sequence[JointEntry]) -> tuple[Plate, Any]:
         """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""

@@ -19,8 +19,8 @@ FOLLOWED = (*ON_LEGS, KINDS[CAM].alone)
 
 @dataclass(frozen=True)
 class LinkEntry:
-    """A link as described: its points [m], mass [kg], inertia about the centroid [kg m2], centroid [m], and further
-    masses at points [kg]."""
+    """A link as described: its points [m], mass [kg], inertia about the centroid [kg m2], centroid [m], further
+    masses at points [kg], and the stiffness [N/m] by which it shares a force, 0 if it has none."""
 
     name: str
     points: Mapping[str, Sequence[Entry]]
@@ -28,6 +28,7 @@ class LinkEntry:
     inertia: Entry
     centroid: Sequence[Entry]
     masses: Mapping[str, Entry]
+    stiffness: Entry
 
     @property
     def heavy(self) -> bool:
@@ -76,22 +77,16 @@ def groups_of(
     InputError
         if the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    moved, driver = {entry.joint: entry.link for entry in drivers}, drivers[0]
-    groups = decompose(links, [in_decomposition(joint) for joint in joints], moved)
-    free = any(entry.is_free for entry in drivers)
-    refused = FOLLOWED if free else ON_LEGS if driver.linear or driver.swings else ()
-    followed = next((group for group in groups if group.kind in refused), None)
-    if followed is None:
-        return groups
-    kind, many, link = f"a {followed.kind}", len(followed.links) > 1, followed.links[0]
-    who = f"the link{'s' * many} {', '.join(followed.links)} form{'s' * (not many)} {kind}"
-    if free:
+    groups = decompose(
+        links, [in_decomposition(joint) for joint in joints], {entry.joint: entry.link for entry in drivers}
+    )
+    followed = next((group for group in groups if group.kind in FOLLOWED), None)
+    if followed is not None and any(entry.is_free for entry in drivers):
+        kind, many, link = f"a {followed.kind}", len(followed.links) > 1, followed.links[0]
+        who = f"the link{'s' * many} {', '.join(followed.links)} form{'s' * (not many)} {kind}"
         law = 'give the other one a law, phi = "..."'
         raise InputError(f"{who}, and two drivers are inputs: {kind} needs one; {law}", key=link)
-    moves = "swings" if driver.swings else "slides"
-    remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
-    needed = f"{kind} needs a driver that {remedy} drive another link"
-    raise InputError(f"{who}, and the driver {moves}: {needed}", key=link)
+    return groups
 
 
 @dataclass(frozen=True)
@@ -99,7 +94,8 @@ class Structure:
     """A linkage without numbers: entries by name, the groups in order, the names of pins, and the assembly.
 
     `driver` is the first one, and `further` are the others. `marked` are the points, by link and name, that joints or
-    loads need on this very link; `poses` are rough poses (x, y, angle) of all links at the driver's value `start`."""
+    loads need on this very link; `poses` are rough poses (x, y, angle) of all links at the driver's value `start`;
+    `span` is its range, if it has one."""
 
     ground: Mapping[str, Sequence[Entry]]
     links: Mapping[str, LinkEntry]
@@ -111,8 +107,7 @@ class Structure:
     marked: frozenset[LinkPoint]
     start: float
     poses: Mapping[str, tuple[float, float, float]]
-    span: tuple[float, float] | None
-    """the middle of the range of the first driver, and half of it; None of one that turns all the way round"""
+    span: Sequence[float]
 
     @property
     def drivers(self) -> tuple[DriverEntry, ...]:
@@ -145,6 +140,7 @@ class Structure:
                 link.get("inertia", 0.0),
                 link.get("centroid", [0.0, 0.0]),
                 link.get("masses", {}),
+                link.get("stiffness", 0.0),
             )
             for link in data["links"]
         }
@@ -178,7 +174,7 @@ class Structure:
             frozenset(marked),
             start["value"],
             poses,
-            (0.5 * (span[0] + span[1]), 0.5 * (span[1] - span[0])) if (span := data.get("range")) else None,
+            data.get("range") or (),
         )
 
 
