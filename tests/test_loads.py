@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from records import record_of
+from xarray import Dataset
 
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.study import remarks
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
-from chainunit.study.remarks import _on_backward_pull
+from chainunit.study.record import StudyFindings
 
 FOLDER = Path(__file__).parents[1] / "examples" / "loads"
 TURN = np.linspace(0.0, 2.0 * math.pi, 721)[:-1]
@@ -102,7 +105,7 @@ def test_a_load_that_turns_its_machine_back_needs_a_backstop(name, gear, least):
         "[system]\nmotor = 'IE3 4-pole 22 kW, 180L'\n[run]\ncrank_speed = 6\n"
     )
     study = record_of(config, drive_of(config))
-    _on_backward_pull(study)
+    remarks._on_backward_pull(study)
     torques = [remark.quantities["torque"][0] for remark in study.findings.remarks]
     # the friction fades at slow speed
     assert torques == ([] if least is None else [pytest.approx(least, rel=0.05)])
@@ -124,3 +127,21 @@ def test_a_hammer_mill_is_held_by_its_material():
     assert torque("hammer_mill", w) == pytest.approx(74.0, rel=1e-4)
     assert torque("hammer_mill", 0.0) == pytest.approx(0.0, abs=1e-12)
     assert torque("hammer_mill", -w) == pytest.approx(-74.0, rel=1e-4)
+
+
+def test_an_inverter_that_hunts_by_its_slip_compensation_is_told():
+    """The fan takes an even torque, about which the torque of the motor swings by 233 N m."""
+    config = parse(
+        f"event = []\nstart = 'inverter'\n[machine]\nlinkage = '{(FOLDER / 'fan').as_posix()}.toml'\n"
+        "[system]\nmotor = 'IE3 4-pole 11 kW, 160M'\n[gear]\nratio = 1\n[run]\ncrank_speed = 150\n"
+    )
+    study = record_of(config, drive_of(config))
+    for swing, hunts in ((233.0, True), (15.0, False)):
+        torque = 57.0 + 0.5 * swing * np.sin(TURN)
+        run = Dataset({"motor.air_gap_tau": ("time", torque), "machine.tau_bias": ("time", 0.0 * TURN)})
+        findings = StudyFindings("wheel")
+        remarks._on_hunting(
+            SimpleNamespace(setup=study.setup, runs=SimpleNamespace(steady=run), findings=findings)
+        )
+        told = [remark.quantities for remark in findings.remarks]
+        assert [sizes["swing"][0] for sizes in told] == ([pytest.approx(swing, rel=1e-3)] if hunts else [])

@@ -85,6 +85,7 @@ def conclude(study: StudyRecord) -> None:
         _on_steady_running(study, study.runs.answers[STEADY])
         if study.setup.drive.foreign is None:
             _on_rotor(study)
+            _on_hunting(study)
     of_drive = None if study.setup.proposal is None else study.setup.proposal.findings
     if of_drive is not None:
         of_drive.remark(study)
@@ -588,6 +589,15 @@ _SLIP = note(
     "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip).",
     sizes={"Hz/(N.m)": "slip"},
 )
+_HUNTS = warning(
+    "slip-compensation-hunts",
+    "The slip compensation of the inverter lets the torque of the motor swing by {swing}, while its load swings by "
+    "{load}.",
+    remedy="Halve starter.inverter.slip, now {slip}.",
+    sizes={"N.m": "swing load", "Hz/(N.m)": "slip"},
+)
+_HUNTING = 0.3
+"""Swing of the torque beyond that of the load, over the rated torque, from which on an inverter hunts."""
 _DROOP = note(
     "inverter-droop",
     "The frequency of the inverter falls by {droop} at the rated torque of the motor (starter.droop).",
@@ -616,6 +626,17 @@ def _on_rotor(study: StudyRecord) -> None:
     if most > 1.05 * load:
         ripple = study.runs.answers[STEADY].speed_ripple
         study.findings.say(_ROTOR, STEADY, load=load, most=most, ripple=ripple)
+
+
+def _on_hunting(study: StudyRecord) -> None:
+    """Warn of slip compensation that answers the torque of the motor so fast that both swing."""
+    steady, drive, plate = study.runs.steady, study.setup.drive, study.setup.plate
+    if plate is None or not drive.follows or "machine.tau_bias" not in steady:
+        return
+    swing, load = (float(np.ptp(steady[full].values)) for full in ("motor.air_gap_tau", "machine.tau_bias"))
+    load, slip = load / drive.whole_line.ratio, drive.parameters.inverter.slip
+    if slip > 0.0 and swing > load + _HUNTING * plate.nameplate.torque:
+        study.findings.say(_HUNTS, STEADY, swing=swing, load=load, slip=slip)
 
 
 def _on_inverter(study: StudyRecord) -> None:

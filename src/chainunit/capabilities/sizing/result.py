@@ -207,7 +207,11 @@ class DriveProtection:
     start_torque: float = quantity(
         "N.m", "largest torque of a start of the cold motor on the coupling by load and acceleration"
     )
-    breakdown_torque: float = quantity("N.m", "pull-out torque of the warm motor, at the {driver}")
+    breakdown_torque: float = quantity(
+        "N.m",
+        "pull-out torque of the motor, as warm as steady running makes it, or torque at which the line slips, at the "
+        "{driver}",
+    )
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
     disturbances: Mapping[str, InUnit] = part("peak of each disturbance on the coupling")
