@@ -20,6 +20,7 @@ from ..machines.paper_ratios import Ratios, of_ratios
 from ..mechanism.models import MachineModel
 from ..reading.tables import (
     UnusualValue,
+    entries,
     filled,
     given_values,
     in_file,
@@ -55,7 +56,6 @@ from .parts import (
     Parts,
     beside,
     catalogues_of,
-    entries,
     example,
     linkage_lines,
     motor_is_left,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -23,6 +23,7 @@ from ..models import MACHINES, MOTORS
 from ..reading.tables import (
     Title,
     UnusualValue,
+    entries,
     file_form,
     given_values,
     merged,
@@ -178,17 +179,6 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
 def motor_is_left(data: Mapping[str, Any]) -> bool:
     """Whether a file leaves the choice of the motor to a capability."""
     return any(table in data for table in choosing_tables())
-
-
-def entries(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The entries of a table and of all its inner tables, each by its full name."""
-    # not by recursion: a wrong file may be nested without end
-    tables = [("", data)]
-    for prefix, table in tables:
-        for name, value in table.items():
-            yield prefix + name, value
-            if isinstance(value, Mapping):
-                tables.append((f"{prefix}{name}.", value))
 
 
 def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:

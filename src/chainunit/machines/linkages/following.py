@@ -137,8 +137,8 @@ class FollowedLinkage:
         low, high = self.way.span
         places = [q, *(low + (high - low) * n / _PLACES for n in range(_PLACES + 1))]
         group = (self.linkage.driver, *self.linkage.groups)[k + 1 - self._drivers]
-        ground, words = self.linkage.ground, self.way.words(q)
-        return open_group(self.structure.groups[k], words, group, ground, self._before(k), places)
+        group_entry, ground = self.structure.groups[k], self.linkage.ground
+        return open_group(group_entry, self.way.words(q), group, ground, self._before(k), places)
 
     def _open_at(self, q: float) -> int | None:
         """The number of the first group of the structure that does not close at a place; None if all close."""
