@@ -341,6 +341,17 @@ def _allowed(error: ErrorDetails, key: str) -> str:
     return f"must be {_KINDS[kind]}" if kind in _KINDS else error["msg"].lower()
 
 
+def entries(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The entries of a table and of all its inner tables, each by its full name."""
+    # not by recursion: a wrong file may be nested without end
+    tables = [("", data)]
+    for prefix, table in tables:
+        for name, value in table.items():
+            yield prefix + name, value
+            if isinstance(value, Mapping):
+                tables.append((f"{prefix}{name}.", value))
+
+
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """The table `over`, completed by the values of `base` that it does not have."""
     result = dict(base)

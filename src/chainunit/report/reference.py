@@ -96,10 +96,8 @@ def _with_key(name: str) -> Iterator[KeyTable]:
 
 
 def _begins(key: list[str], prefix: list[str]) -> bool:
-    """Whether the parts of the name of a key begin with these."""
-    return len(prefix) <= len(key) and all(
-        part in (word, NAME) for part, word in zip(key, prefix, strict=False)
-    )
+    """Whether the parts of the name of a key begin with these parts."""
+    return len(prefix) <= len(key) and all(x in (y, NAME) for x, y in zip(key, prefix, strict=False))
 
 
 def _key_names() -> Iterator[str]:

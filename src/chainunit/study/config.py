@@ -20,6 +20,7 @@ from ..machines.paper_ratios import Ratios, of_ratios
 from ..mechanism.models import MachineModel
 from ..reading.tables import (
     UnusualValue,
+    entries,
     filled,
     given_values,
     in_file,
@@ -56,7 +57,6 @@ from .parts import (
     beside,
     catalogues_of,
     example,
-    full_names,
     linkage_lines,
     motor_is_left,
     over_example,
@@ -494,7 +494,7 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event]) -> frozenset[st
     """Names of all values that a file gives, events by the names of their runs."""
     if "event" in data:
         data = {**data, "event": dict(zip(events, data["event"], strict=True))}
-    return frozenset(name for name, is_table in full_names(data) if not is_table)
+    return frozenset(name for name, value in entries(data) if not isinstance(value, Mapping))
 
 
 def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str, float]) -> Machine:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -23,6 +23,7 @@ from ..models import MACHINES, MOTORS
 from ..reading.tables import (
     Title,
     UnusualValue,
+    entries,
     file_form,
     given_values,
     merged,
@@ -163,8 +164,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     with faults.collected():
         machine, unusual = _machine_model(table, source)
     faults.refuse()
-    names = (name.partition("machine.") for name, _ in full_names(data))
-    machine, wrong = _with_further(machine, [name for before, key, name in names if key and not before])
+    machine, wrong = _with_further(machine, [name for name, _ in entries(named_table(data, "machine"))])
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
@@ -180,18 +180,6 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
 def motor_is_left(data: Mapping[str, Any]) -> bool:
     """Whether a file leaves the choice of the motor to a capability."""
     return any(table in data for table in choosing_tables())
-
-
-def full_names(data: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
-    """The full names of the entries of a table and of all its inner tables, each with whether it is a table."""
-    # not by recursion: a wrong file may be nested without end
-    tables = [("", data)]
-    for prefix, table in tables:
-        for name in table:
-            is_table = isinstance(table[name], Mapping)
-            yield prefix + name, is_table
-            if is_table:
-                tables.append((f"{prefix}{name}.", table[name]))
 
 
 def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:
