@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import json
 import math
-import re
 from functools import partial
 from pathlib import Path
 
@@ -355,14 +354,3 @@ def test_the_loss_of_the_gear_of_an_own_motor_is_in_its_report(tmp_path):
     )
     (said,) = [remark for remark in study.findings.notes if remark.code == "gear-loss"]
     assert said.quantities["total"].value == found.loss.whole > 1.0
-
-
-def test_an_export_tells_of_a_motor_that_stalls():
-    """The pins and the load of a mill of 1.5 kN a side are too much for a motor of 0.12 kW, not for the example's."""
-    load_lines = "[feed]\nleft = { processing_force = 1500 }\nright = { processing_force = 1500 }\n"
-    stalls = parse(f'{load_lines}[system]\nmotor = "IE3 4-pole 0.12 kW, 63M"\n')
-    assert re.fullmatch(
-        r"From rest the motor brings the crank to \S+ rad/s in place of 3\.00 rad/s\.",
-        remarks_on_export(stalls)[-1],
-    )
-    assert not any("From rest" in sentence for sentence in remarks_on_export(parse("")))

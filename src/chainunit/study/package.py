@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..batch.transients import can_run
 from ..core.errors import InputError, RunError, printable
 from ..core.files import scratch
 from ..core.model import About, Model
@@ -28,14 +27,11 @@ from .choice import choose_for, with_parts_beside
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
-from .limits import reaches
 from .operation import OperatingConditions
 from .organ_limits import limits_of_organs, passed_limits
 from .registry import parts_of_line
 from .remarks import lengths_of_example
-from .rig import Rig
-from .start_up import start_up
-from .verdict import on_limit, shown_speed
+from .verdict import on_limit
 
 
 def study_system(drive: Drive, operation: OperatingConditions) -> System:
@@ -173,25 +169,7 @@ def remarks_on_export(config: Config) -> list[str]:
         end = f'This study turns at {turns}. For chains give the study organ = "chain".'
         passed = passed_limits(limits_of_organs(config.machine, config.feed, ("N.m",)), speed)
         sentences += [f"{on_limit(limit.topic, limit.speed)} {end}" for limit in passed]
-    # a motor that a capability chose has run from rest
-    if config.motor is not None and can_run():
-        sentences.append(_slow_start(drive_to_export(config), config.operation))
     return list(filter(None, sentences))
-
-
-def _slow_start(drive: Drive, operation: OperatingConditions) -> str:
-    """A sentence on a drive that does not come to its speed in a run of its compiled system from rest; empty for one
-    that does, and for one with a foreign FMU."""
-    if drive.foreign or drive.foreign_machine:
-        return ""
-    rig = Rig(operation, drive, None)
-    with rig.from_rest() as simulation:
-        steady, _ = start_up(rig, simulation, lambda done: None, {}).windows
-    asked, mean = operation.crank_speed, steady.speed_mean
-    if reaches(mean, asked):
-        return ""
-    speed, wanted = (number(x, "rad/s", "speed", beside=False) for x in (shown_speed(mean, asked), asked))
-    return f"From rest the motor brings the {drive.driver_noun} to {speed} in place of {wanted}."
 
 
 def _is_of(model: Model, drive: Drive) -> bool:
