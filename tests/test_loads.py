@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -105,7 +104,7 @@ def test_a_load_that_turns_its_machine_back_needs_a_backstop(name, gear, least):
         "[system]\nmotor = 'IE3 4-pole 22 kW, 180L'\n[run]\ncrank_speed = 6\n"
     )
     study = record_of(config, drive_of(config))
-    remarks._on_backward_pull(study)
+    remarks._on_backward_pull(study.setup, study.findings)
     torques = [remark.quantities["torque"][0] for remark in study.findings.remarks]
     # the friction fades at slow speed
     assert torques == ([] if least is None else [pytest.approx(least, rel=0.05)])
@@ -140,8 +139,6 @@ def test_an_inverter_that_hunts_by_its_slip_compensation_is_told():
         torque = 57.0 + 0.5 * swing * np.sin(TURN)
         run = Dataset({"motor.air_gap_tau": ("time", torque), "machine.tau_bias": ("time", 0.0 * TURN)})
         findings = StudyFindings("wheel")
-        remarks._on_hunting(
-            SimpleNamespace(setup=study.setup, runs=SimpleNamespace(steady=run), findings=findings)
-        )
+        remarks._on_hunting(study.setup, run, findings)
         told = [remark.quantities for remark in findings.remarks]
         assert [sizes["swing"][0] for sizes in told] == ([pytest.approx(swing, rel=1e-3)] if hunts else [])

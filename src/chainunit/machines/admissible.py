@@ -14,8 +14,6 @@ from ..mechanism.models import MachineModel
 
 _ROUNDS = 24
 _GROWTH = 1.25
-_NOISE = 1e-6
-"""Limit over the refused value up to which it is 0."""
 _FARTHEST = 1e3
 """Ratio to the declared start value up to which a limit is sought."""
 
@@ -84,12 +82,8 @@ def causes(
         if span is None:
             continue
         # a bound of 0 has a tolerance, which the search finds
-        noise = _NOISE * abs(values[name])
-        ends = (
-            0.0 if abs(x) < noise else rounded_inward(x, sense)
-            for x, sense in zip(span, (1.0, -1.0), strict=True)
-        )
-        low, high = (f"{end:.4g}" for end in ends)
+        ends = [0.0 if abs(x) < 1e-6 * abs(values[name]) else x for x in span]
+        low, high = (f"{rounded_inward(x, sense):.4g}" for x, sense in zip(ends, (1.0, -1.0), strict=True))
         limits = [f">= {low}{unit}"] if span[0] not in (0.0, -math.inf) else []
         limits += [f"<= {high}{unit}"] if math.isfinite(span[1]) else []
         reasons[name] = f"{name} = {values[name]:g}{unit} must be {' and '.join(limits)}"

@@ -13,9 +13,6 @@ else:
     Dataset = Any
 
 
-_NOISE = 1e-12
-
-
 def peak(x: Any) -> float:
     """Largest size of an array."""
     return float(np.max(np.abs(x)))
@@ -28,7 +25,7 @@ def rms(x: Any) -> float:
 
 def above_noise(value: float, scale: float) -> float:
     """The value, or 0 where it is the rounding of numbers of the size `scale`."""
-    return value if abs(value) > _NOISE * scale else 0.0
+    return value if abs(value) > 1e-12 * scale else 0.0
 
 
 def stretches(inside: Any) -> list[tuple[int, int]]:

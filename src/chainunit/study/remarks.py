@@ -12,7 +12,7 @@ import numpy as np
 
 from ..reading.text import aside, number
 from .analyses import all_analyses
-from .arrays import peak
+from .arrays import Dataset, peak
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .cycle import cycle
@@ -80,12 +80,13 @@ def conclude(study: StudyRecord) -> None:
         _on_start(study)
         _on_star(study)
         _on_inertia(study)
-        _on_backward_pull(study.setup, study.findings)
+        if not study.setup.drive.foreign_machine:
+            _on_backward_pull(study.setup, study.findings)
         _on_limits(study)
         _on_steady_running(study, study.runs.answers[STEADY])
         if study.setup.drive.foreign is None:
             _on_rotor(study)
-            _on_hunting(study)
+            _on_hunting(study.setup, study.runs.steady, study.findings)
     of_drive = None if study.setup.proposal is None else study.setup.proposal.findings
     if of_drive is not None:
         of_drive.remark(study)
@@ -457,19 +458,15 @@ _PULLED_BACK = warning(
     "A backstop (holdback) or a brake is needed.",
     sizes={"N.m": "torque"},
 )
-_BACKWARDS = -0.1
-"""Speed of the turn that shows whether a load turns its machine back, over the requested one: the friction holds, and
-the resistance of air or liquid is small."""
 
 
 def _on_backward_pull(setup: StudySetup, findings: StudyFindings) -> None:
-    """Warn of a load that no angle of the crank holds without the motor, as the weight of goods on a conveyor that
-    rises. A gear that loses as much as it passes on holds it."""
-    if setup.drive.foreign_machine or setup.drive.gear.loss >= 1.0:
-        return
-    turn = cycle(setup.config.machine, _BACKWARDS * setup.config.run.crank_speed, setup.config.feed)
-    if (torque := float(np.min(turn.crank_torque))) > 0.0:
-        findings.say(_PULLED_BACK, STEADY, torque=torque)
+    """Warn of a load that no angle of the crank holds without the motor. A self-locking gear holds it."""
+    config, drive = setup.config, setup.drive
+    # at a tenth of the speed backwards the friction is whole, and the resistance of air or liquid small
+    torque = np.min(cycle(config.machine, -0.1 * config.run.crank_speed, config.feed).crank_torque)
+    if torque > 0.0 and drive.gear.loss < 1.0:
+        findings.say(_PULLED_BACK, STEADY, torque=float(torque))
 
 
 _HAPPENINGS = {
@@ -596,8 +593,6 @@ _HUNTS = warning(
     remedy="Halve starter.inverter.slip, now {slip}.",
     sizes={"N.m": "swing load", "Hz/(N.m)": "slip"},
 )
-_HUNTING = 0.3
-"""Swing of the torque beyond that of the load, over the rated torque, from which on an inverter hunts."""
 _DROOP = note(
     "inverter-droop",
     "The frequency of the inverter falls by {droop} at the rated torque of the motor (starter.droop).",
@@ -628,15 +623,16 @@ def _on_rotor(study: StudyRecord) -> None:
         study.findings.say(_ROTOR, STEADY, load=load, most=most, ripple=ripple)
 
 
-def _on_hunting(study: StudyRecord) -> None:
-    """Warn of slip compensation that answers the torque of the motor so fast that both swing."""
-    steady, drive, plate = study.runs.steady, study.setup.drive, study.setup.plate
-    if plate is None or not drive.follows or "machine.tau_bias" not in steady:
+def _on_hunting(setup: StudySetup, steady: Dataset, findings: StudyFindings) -> None:
+    """Warn of slip compensation that lets the torque swing by 30 % of the rated one more than the load does."""
+    drive, plate = setup.drive, setup.plate
+    names = "motor.air_gap_tau", "machine.tau_bias"
+    if plate is None or not drive.follows or names[1] not in steady:
         return
-    swing, load = (float(np.ptp(steady[full].values)) for full in ("motor.air_gap_tau", "machine.tau_bias"))
+    swing, load = (float(np.ptp(steady[full].values)) for full in names)
     load, slip = load / drive.whole_line.ratio, drive.parameters.inverter.slip
-    if slip > 0.0 and swing > load + _HUNTING * plate.nameplate.torque:
-        study.findings.say(_HUNTS, STEADY, swing=swing, load=load, slip=slip)
+    if slip > 0.0 and swing > load + 0.3 * plate.nameplate.torque:
+        findings.say(_HUNTS, STEADY, swing=swing, load=load, slip=slip)
 
 
 def _on_inverter(study: StudyRecord) -> None:

@@ -209,8 +209,7 @@ class DriveProtection:
     )
     breakdown_torque: float = quantity(
         "N.m",
-        "pull-out torque of the motor, as warm as steady running makes it, or torque at which the line slips, at the "
-        "{driver}",
+        "pull-out torque of the motor as warm as in running, or torque at which the line slips, at the {driver}",
     )
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
