@@ -11,8 +11,10 @@ import math
 import fmpy
 import numpy as np
 import pytest
+from javascript_hosts import node
 from multibody import Multibody
 from test_linkage_random import by_the_machine, deviations
+from test_live import check_turn, varied
 
 from chainunit.core.errors import InputError
 from chainunit.core.native.compilers import compiler
@@ -22,6 +24,7 @@ from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
 from chainunit.report.drawing import drawing
+from chainunit.report.live.machine import of_linkage
 from chainunit.study.linkage_turn import linkage_findings
 
 
@@ -328,6 +331,16 @@ def test_fmus(name, make, tmp_path):
             found = {key: float(row[key]) for key in values}
             key, worst = max(deviations(found, values), key=lambda pair: pair[1])
             assert worst < 1e-11, (q, key, worst)
+
+
+@node
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["planetary", "rack_of_a_lever", "belt_around_the_sun", "belt_on_a_rocker"])
+def test_live_pages(name):
+    """A turn in JavaScript is that of Python, also with other lengths and loads."""
+    machine = Machine(machine_of(described(name)))
+    live = of_linkage(machine, 5.0, f"{name}.toml")
+    check_turn(live, machine, 5.0, machine.model.Feed(), varied(live, 4, 1))
 
 
 @pytest.mark.stages(first=3)
