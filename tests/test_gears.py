@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import copy
 import math
+from contextlib import suppress
 
 import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from javascript_hosts import node
 from multibody import Multibody
 from test_linkage_random import by_the_machine, deviations
 from test_live import check_turn, varied
 
-from chainunit.core.errors import InputError
+from chainunit.core.errors import GeometryError, InputError
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
@@ -684,3 +686,50 @@ def test_the_pitch_line_stays_on_its_side_of_the_pinion(pitch_radius):
         InputError, match=r"to the other side of its centre|with h = -0\.05; must be > 0\.001"
     ):
         machine.replace(h=pitch_radius)
+
+
+@pytest.mark.parametrize("make", [None, *(["native"] if compiler() else []), "python"])
+def test_parameters_that_bring_pulleys_together(make, tmp_path):
+    """They are refused as the pulleys of a file are, in Python and by FMUs."""
+    data = belted(five_bar, mesh=([0.1, 0.2], False))
+    del data["links"]["left"], data["links"]["right"]
+    data["loads"] = {"brake": {"type": "torque", "on": "wheel", "torque": -20.0}}
+    data["links"]["wheel"]["points"] = {"O2": [0, 0], "B": [0.05, 0]}
+    data |= {"start": {"phi": 0.2, "angles": {"wheel": 0.7}}, "parameters": {"c": 0.3}, "gravity": 0.0}
+    data["ground"]["O2"] = ["c", 0]
+    machine = Machine(machine_of(description_of(data, "belt")))
+    if make is None:
+        # the strands of unequal pulleys push the centre to the side, by the sine of their slope
+        for c in (0.3, 0.16):
+            out = machine.replace({"c": c}).outputs(0.3, 0.0)
+            assert float(out.O2.fy) / float(out.mesh.fx) == pytest.approx(0.05 / c)
+        for c in (0.15, 0.12):
+            with pytest.raises(InputError, match=r"belt mesh = .* the pulleys overlap with c = .* > 0.15 m"):
+                machine.replace({"c": c})
+        return
+    file = (export if make == "native" else export_python)(machine.model, tmp_path / "belt.fmu")
+    logged: list[str] = []
+    for c in (0.16, 0.12):
+        fits = False
+        with suppress(FMICallException):
+            rows = fmpy.simulate_fmu(
+                str(file), stop_time=0.01, fmi_type="CoSimulation", output=["tau"], start_values={"c": c},
+                logger=lambda *args: logged.append(str(args[-1])),
+            )  # fmt: skip
+            fits = bool(np.all(np.isfinite(rows["tau"])))
+        assert fits == (c > 0.15)
+    assert make == "python" or "overlap with c = 0.12" in "".join(logged)
+
+
+@pytest.mark.parametrize("text", ["big", "c / 2", "4 kg"])
+def test_a_wrong_diameter_is_refused_by_its_key(text):
+    with pytest.raises(InputError) as caught:
+        machine_of(description_of(belt(diameters=[text, 0.1]), "wrong"))
+    assert [fault.key for fault in caught.value.faults] == ["joints.mesh.diameters"]
+
+
+def test_a_parameter_that_leaves_a_rod_no_length():
+    data = five_bar()
+    data["parameters"], data["links"]["left"]["points"]["C"] = {"l": 0.25}, ["l", 0]
+    with pytest.raises(GeometryError, match="left: its points A and C are in one place; must be apart"):
+        Machine(machine_of(description_of(data, "short"))).replace({"l": 0.0})

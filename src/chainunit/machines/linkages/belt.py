@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.errors import shown
+from ...core.errors import InputError, shown
 from ...core.planar import Motion, Vec2
 from ...groups.block import Row
 from ...groups.body import Load
 from ...groups.group import Outline
 from ...groups.joints import LinkageInMotion, Placed, Rail, Rates, Third
 from .gear import GearedLink, GearKind, MeshData
-from .joint_kind import JointEntry, JointParts, JointTable
+from .joint_kind import BELT, JointEntry, JointParts, JointTable
 
 if TYPE_CHECKING:
     from .entries import EntryReader
@@ -150,7 +150,7 @@ class BeltedLink(GearedLink):
 class BeltKind(GearKind):
     """A belt or a chain: the links `on` and `by` are pulleys about their points, which are pinned to one link."""
 
-    name = noun = "belt"
+    name = noun = BELT
     keys = ("diameters", "crossed")
     use = "for a belt give it `diameters`, the pitch diameters of both pulleys"
     limits = "The reaction of a belt is its pull; its tension, which presses the pulleys together, is in no reaction."
@@ -160,16 +160,16 @@ class BeltKind(GearKind):
         """Add the pitch diameters of both pulleys [m], and whether the belt is crossed."""
         diameters: Any = table.get("diameters")
         crossed = table.get("crossed", False)
-        numbers = []
-        if isinstance(diameters, list) and len(diameters) == 2:
-            numbers = [reader.number(f"{key}.diameters", x, "m") for x in diameters]
-        if len(numbers) < 2 or any(x <= 0.0 for x in numbers):
-            state = "is missing" if diameters is None else f"is {shown(diameters)}"
-            reader.fault(
-                f"{key}.diameters",
-                f"{state}; must be two lengths > 0, the pitch diameters of {joint['on'][0]} and of "
-                f'{joint["by"][0]}, such as ["80 mm", "160 mm"]',
-            )
+        numbers = list[float]()
+        with reader.at(f"{key}.diameters"):
+            if isinstance(diameters, list) and len(diameters) == 2:
+                numbers = [reader.number(f"{key}.diameters", x, "m") for x in diameters]
+            if not numbers or min(numbers) <= 0.0:
+                raise InputError(
+                    f"is {'missing' if diameters is None else shown(diameters)}; must be two lengths > 0, the "
+                    f"pitch diameters of {joint['on'][0]} and of {joint['by'][0]}, such as "
+                    '["80 mm", "160 mm"]'
+                )
         if not isinstance(crossed, bool):
             reader.fault(f"{key}.crossed", f"is {shown(crossed)}; must be true or false")
         joint |= {"diameters": numbers, "crossed": crossed}

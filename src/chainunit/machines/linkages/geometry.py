@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ...core.errors import InputError
+from ...core.errors import GeometryError, InputError
 from ...core.planar import ZERO, Vec2, mirrored, rotated
 from ...groups.body import Mass
 from ...mechanism.assur import CYLINDER, ELBOW, GROUND
@@ -88,9 +88,17 @@ class LinkGeometry:
         return Mass(m, place.x, inertia, place.y)
 
     def span(self, link: str, start: str, end: str) -> tuple[LinkFrame, Any]:
-        """The frame of a link from one of its points to another, and their distance."""
+        """The frame of a link from one of its points to another, and their distance.
+
+        Raises
+        ------
+        GeometryError
+            if a parameter brings both points to one place.
+        """
         a, b = self.point(link, start), self.point(link, end)
         length = self.xp.sqrt((b - a).squared())
+        if isinstance(length, float) and length == 0.0:
+            raise GeometryError(f"{link}: its points {start} and {end} are in one place; must be apart")
         return LinkFrame(a, (b - a) * (1.0 / length)), length
 
     def across(self, joint: JointEntry, v: Vec2, link: str) -> Vec2:

@@ -16,6 +16,7 @@ from ...mechanism.assur import PRISMATIC, REVOLUTE, AssurGroup
 if TYPE_CHECKING:
     from .entries import EntryReader
 
+BELT = "belt"
 CAM = "cam"
 Entry = float | str
 """A number, or the text of an expression."""

@@ -551,11 +551,26 @@ class LinkageDescription(LinkageOutputs):
             )
             for entry in self.further.varying(self.way.turns)
         )
-        return (*margins, *fits, *laws, *(requirement_of_width(*width, names) for width in self.widths))
+        belts = (
+            Requirement(
+                f"distance of the centres of the pulleys of the belt {belt}",
+                "m",
+                "the pulleys overlap",
+                names,
+            )
+            for belt in self.structure.belts
+        )
+        return (
+            *margins,
+            *fits,
+            *laws,
+            *belts,
+            *(requirement_of_width(*width, names) for width in self.widths),
+        )
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad or
-        tetrad, with their limits."""
+        tetrad, and the distance of the pulleys of each belt, with their limits."""
         if self.is_start(xp, p):
             linkage, derived, course = self.at_start, self.start_derived, self.followed.margins
         else:
@@ -569,9 +584,13 @@ class LinkageDescription(LinkageOutputs):
             yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf
         for _, misfit in misfits(linkage, derived):
             yield misfit, -math.inf, MOST_MISFIT
-        values = linkage.parts.geometry.values
+        geometry = linkage.parts.geometry
+        values = geometry.values
         for entry in self.further.varying(self.way.turns):
             yield self.further.misfit(xp, entry, values, self.way.start), -BACK, BACK
+        for belt in self.structure.belts.values():
+            distance = geometry.span(belt.third, *belt.table["held"])[1]
+            yield distance, 0.5 * sum(belt.table["diameters"]), math.inf
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
 

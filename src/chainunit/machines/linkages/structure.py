@@ -9,7 +9,7 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...mechanism.assur import DRIVES, GROUND, ON_LEGS, PRISMATIC, REVOLUTE, AssurGroup, decompose
-from .joint_kind import CAM, Entry, JointEntry
+from .joint_kind import BELT, CAM, Entry, JointEntry
 from .joint_kinds import KINDS, SINGLES, in_decomposition
 from .names import LinkPoint, connected, owners_of
 
@@ -113,6 +113,11 @@ class Structure:
     def drivers(self) -> tuple[DriverEntry, ...]:
         """All drivers."""
         return self.driver, *self.further
+
+    @property
+    def belts(self) -> Mapping[str, JointEntry]:
+        """The belts by name."""
+        return {name: joint for name, joint in self.joints.items() if joint.kind == BELT}
 
     @property
     def rate(self) -> float:
