@@ -13,6 +13,7 @@ the frame, pin N against the rocker. Two rods that fold up against each other me
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from ..core.planar import ZERO, Motion, Vec2
@@ -199,16 +200,6 @@ class Chain:
     chain in the pins A1 and A2 [N m]; `folding` is the energy in the stops [J], `damping_power` the power that
     damping takes [W]."""
 
-    __slots__ = (
-        "_end",
-        "_solution",
-        "damping_power",
-        "folding",
-        "moment_at_end",
-        "moment_at_start",
-        "recursion",
-    )
-
     def __init__(
         self,
         xp: Any,
@@ -252,22 +243,20 @@ class Chain:
             at_start,
         )
         self._end = end
-        self._solution: tuple[list[Any], list[Vec2]] | None = None
 
-    def _solve(self) -> tuple[list[Any], list[Vec2]]:
-        if self._solution is None:
-            self._solution = self.recursion.back(self.recursion.force(self._end))
-        return self._solution
+    @cached_property
+    def _solution(self) -> tuple[list[Any], list[Vec2]]:
+        return self.recursion.back(self.recursion.force(self._end))
 
     @property
     def rates(self) -> list[Any]:
         """Angular accelerations of the rods [rad/s2]."""
-        return self._solve()[0]
+        return self._solution[0]
 
     @property
     def forces(self) -> list[Vec2]:
         """Forces f_0 .. f_N at the pins [N]."""
-        return self._solve()[1]
+        return self._solution[1]
 
     @staticmethod
     def _stop(xp: Any, rods: Rods, fold: Any) -> tuple[Any, Any]:

@@ -12,15 +12,15 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
-from ..core.planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Vec2
 from .body import Body
-from .joints import GuideForce, Joint, Slide
+from .joints import GuideForce, Joint, LinkageInMotion
 
 Reactions = Mapping[Joint, Vec2]
 """The force in each joint on its link [N]."""
 
 
-class Moving(Protocol):
+class Moving(LinkageInMotion, Protocol):
     """A linkage in motion, as loads see it."""
 
     @property
@@ -32,24 +32,12 @@ class Moving(Protocol):
         """The derivative of that place by the coordinate, 1 if it is the coordinate itself."""
 
     @property
-    def links(self) -> Mapping[str, Link]:
-        """Links by name."""
-
-    @property
-    def pins(self) -> Mapping[str, Motion]:
-        """Pins and points by name."""
-
-    @property
     def bodies(self) -> Mapping[str, Body]:
         """Bodies by the names of their links."""
 
     @property
     def turns(self) -> Mapping[Joint, Any]:
         """Relative rotation by the coordinate in each joint that turns."""
-
-    @property
-    def slides(self) -> Mapping[Joint, Slide]:
-        """The motion in each joint that slides."""
 
     def carrier(self, pin: str) -> str:
         """The link that carries a pin or a point."""

@@ -17,8 +17,6 @@ from ..core.errors import InputError
 
 GROUND = "ground"
 REVOLUTE, PRISMATIC = "revolute", "prismatic"
-
-
 FURTHER_DRIVERS = "give each of the others a table [drivers.NAME] beside [driver]"
 
 
@@ -287,10 +285,7 @@ def _freedoms(
     number = sum(free.values())
     # all that a free link carries along: equations can be handed on to it
     loose = {link for link, count in free.items() if count}
-    while True:
-        more = {link for (k, _), link in matched.items() if link not in loose and {*joints[k].links} & loose}
-        if not more:
-            break
+    while more := {link for (k, _), link in matched.items() if {*joints[k].links} & loose} - loose:
         loose |= more
     names = [link for link in unknown if link in loose]
     lone = [link for link in names if sum(link in (j.on, j.by) for j in joints) < 2]
@@ -307,35 +302,33 @@ def _freedoms(
 
 
 def _strong_parts(depends: Mapping[str, Mapping[str, None]]) -> Iterator[list[str]]:
-    """The strongly connected parts, each after all that it depends on (Tarjan)."""
-    order: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    held: set[str] = set()
+    """The parts of links that depend on each other, each after all that it depends on."""
+    needs = {link: _needed(link, depends) for link in depends}
+    seen: set[str] = set()
 
     def visit(link: str) -> Iterator[list[str]]:
         """The parts that are complete once the link and all that it depends on are seen."""
-        order[link] = low[link] = len(order)
-        stack.append(link)
-        held.add(link)
+        part = [other for other in depends if other in needs[link] and link in needs[other]]
+        is_first = seen.isdisjoint(part)
+        seen.add(link)
         for other in depends[link]:
-            if other not in order:
+            if other not in seen:
                 yield from visit(other)
-                low[link] = min(low[link], low[other])
-            elif other in held:
-                low[link] = min(low[link], order[other])
-        if low[link] == order[link]:
-            part = []
-            while True:
-                part.append(stack.pop())
-                held.discard(part[-1])
-                if part[-1] == link:
-                    break
-            yield sorted(part, key=list(depends).index)
+        if is_first:
+            yield part
 
     for link in depends:
-        if link not in order:
+        if link not in seen:
             yield from visit(link)
+
+
+def _needed(link: str, depends: Mapping[str, Mapping[str, None]]) -> set[str]:
+    """The links on which one depends, also by way of others, and itself."""
+    needed, more = set[str](), {link}
+    while more:
+        needed |= more
+        more = {other for name in more for other in depends[name]} - needed
+    return needed
 
 
 def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[str]) -> AssurGroup:

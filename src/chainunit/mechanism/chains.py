@@ -12,6 +12,7 @@ which is the plain derivative by the angle for two rods. As the rods follow a ch
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 from ..core.engines import Dual, dual, slope
@@ -25,8 +26,6 @@ W_SMALL = 0.01
 class ChainedState(MachineState):
     """A linkage with chains at one point: the `chains` by the names of their loads; `x` the states of the model."""
 
-    __slots__ = ("_slopes", "chains", "x")
-
     def __init__(
         self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any] | None = None, x: Any = None
     ) -> None:
@@ -37,7 +36,6 @@ class ChainedState(MachineState):
             for name, load in self._loads.items()
             if isinstance(load, HangingChain)
         }
-        self._slopes: tuple[Any, Any, Any] | None = None
 
     @property
     def kinetic_energy(self) -> Any:
@@ -59,28 +57,27 @@ class ChainedState(MachineState):
     @property
     def inertia_slope(self) -> Any:
         """The derivative of `J` by the crank angle along the motion [kg m2/rad]."""
-        return self._along()[2]
+        return self._along[2]
 
     def slopes(self) -> tuple[Any, Any]:
         """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad], along the motion."""
-        return self._along()[:2]
+        return self._along[:2]
 
+    @cached_property
     def _along(self) -> tuple[Any, Any, Any]:
         """Derivatives along the motion: of `bias` by the crank angle and the crank speed, and of `J` by the crank
         angle. They are rates by time over the speed; near rest, at `W_SMALL`, the share that stands for 1/w goes to
         0."""
-        if self._slopes is None:
-            w, engine = self.w, dual(self._xp)
-            rates = {name: chain.chain.rates for name, chain in self.chains.items()}
-            moving = self._moving({name: (c.data.state[1], rates[name]) for name, c in self.chains.items()})
-            along = MachineState(engine, Mechanism(engine, self.m.linkage, Dual(self.m.q, w)), w, moving)
-            by_a = {}
-            for name, chain in self.chains.items():
-                at_one, _ = chain.at(1.0)
-                # what an acceleration of 1 rad/s2 of the crank adds to the rates
-                by_a[name] = None, [one - rate for one, rate in zip(at_one, rates[name], strict=True)]
-            quicker = MachineState(engine, self.m, Dual(w, 1.0), self._moving(by_a))
-            w2 = w * w
-            share = w * w2 / (w2 * w2 + W_SMALL * W_SMALL * W_SMALL * W_SMALL)
-            self._slopes = slope(along.bias) * share, slope(quicker.bias), slope(along.J) * share
-        return self._slopes
+        w, engine = self.w, dual(self._xp)
+        rates = {name: chain.chain.rates for name, chain in self.chains.items()}
+        moving = self._moving({name: (c.data.state[1], rates[name]) for name, c in self.chains.items()})
+        along = MachineState(engine, Mechanism(engine, self.m.linkage, Dual(self.m.q, w)), w, moving)
+        by_a = {}
+        for name, chain in self.chains.items():
+            at_one, _ = chain.at(1.0)
+            # what an acceleration of 1 rad/s2 of the crank adds to the rates
+            by_a[name] = None, [one - rate for one, rate in zip(at_one, rates[name], strict=True)]
+        quicker = MachineState(engine, self.m, Dual(w, 1.0), self._moving(by_a))
+        w2 = w * w
+        share = w * w2 / (w2 * w2 + W_SMALL * W_SMALL * W_SMALL * W_SMALL)
+        return slope(along.bias) * share, slope(quicker.bias), slope(along.J) * share

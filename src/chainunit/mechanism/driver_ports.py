@@ -15,13 +15,6 @@ from ..core.ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, lo
 from ..core.quantities import Fields, Value, declaration, declared_class, fields_of, quantity
 
 
-class DriverWords(NamedTuple):
-    """The words for the effort that drives a driver, and for its place."""
-
-    effort: str
-    place: str
-
-
 @declaration
 class DriverEffort:
     """The effort of a driver beside the first one."""
@@ -55,7 +48,8 @@ class DriverPort(NamedTuple):
     terminals: tuple[Terminal, ...]
     flanges: tuple[Terminal, ...]
     inertia: Requirement
-    words: DriverWords
+    words: tuple[str, str]
+    """for the effort that drives it, and for its place"""
     units: Mapping[str, str] = MappingProxyType({})
     """units of quantities at the driver, by those of a driver that turns, where they differ"""
     stop: str = ""
@@ -117,7 +111,7 @@ ROTATING = DriverPort(
         "kg.m2",
         "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
     ),
-    DriverWords("motor torque", "angle"),
+    ("motor torque", "angle"),
 )
 """A driver that a motor turns all the way round."""
 
@@ -207,7 +201,7 @@ SLIDING = DriverPort(
         "kg",
         "at a dead point nothing else carries the force; give the link a mass, or J_added",
     ),
-    DriverWords("force on the driver", "way"),
+    ("force on the driver", "way"),
     MappingProxyType({unit: _UNITS[unit] for unit in ("rad", "rad/s", "N.m", "kg.m2", "N.m/rad")}),
     "end_stop_force",
     _sliding("FollowedSlide", FollowedDriver, "A driver that slides and follows the first one."),

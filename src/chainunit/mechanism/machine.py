@@ -114,7 +114,9 @@ class Mechanism:
     def with_bodies(self, linkage: Linkage) -> Mechanism:
         """The same motion with the bodies and loads of another linkage of the same lengths."""
         other = copy.copy(self)
-        other.linkage, other.bodies = linkage, bodies_on(self.links, linkage)
+        other.linkage = linkage
+        bars = (bar for group in other._data for bar in group.bars if bar.mass is not None)
+        other.bodies = {bar.name: body_on(self.links[bar.name], bar.mass) for bar in bars}
         return other
 
     def third_derivatives(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
@@ -203,12 +205,6 @@ class _OnDemand(dict[str, Any]):
         return value
 
 
-def bodies_on(links: Mapping[str, Link], linkage: Linkage) -> dict[str, Body]:
-    """The bodies of a linkage on these `links`, by name."""
-    bars = (bar for group in (linkage.driver, *linkage.groups) for bar in group.bars)
-    return {bar.name: body_on(links[bar.name], bar.mass) for bar in bars if bar.mass is not None}
-
-
 class LiftedMechanism:
     """A mechanism in the form that loads take (`Moving`), with its derivatives by q as dual parts."""
 
@@ -232,19 +228,15 @@ class LiftedMechanism:
         return self._of.carrier(pin)
 
 
-def _placed(
-    xp: Any, linkage: Linkage, derived: Sequence[Any], q: Any, topology: Topology | None = None
-) -> Mechanism:
-    return Mechanism(xp, linkage, q, derived, topology)
-
-
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
     """Values that follow from the lengths, once before a run: of the groups, then of the extremes."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
-        numbers += group.derive(xp, functools.partial(_placed, xp, linkage.before(k), tuple(numbers)))
+        numbers += group.derive(
+            xp, functools.partial(Mechanism, xp, linkage.before(k), derived=tuple(numbers))
+        )
     if linkage.extremes:
-        placed = functools.partial(_placed, xp, linkage, tuple(numbers), topology=linkage.topology)
+        placed = functools.partial(Mechanism, xp, linkage, derived=tuple(numbers), topology=linkage.topology)
         numbers += [extreme.value(xp, placed) for extreme in linkage.extremes]
     return numbers
 
@@ -336,11 +328,7 @@ class MachineState:
     def reactions(self, a: Any) -> dict[Joint, Vec2]:
         """The force in each joint on its link at crank acceleration `a` [N], without friction."""
         _, inertial = self.inertial()
-        reactions = {}
-        for joint, f in self.steady.reactions.items():
-            more = inertial[joint]
-            reactions[joint] = f.plus(more, a)
-        return reactions
+        return {joint: force.plus(inertial[joint], a) for joint, force in self.steady.reactions.items()}
 
     def moving(self, a: Any) -> InMotion:
         """The linkage in motion at crank acceleration `a`."""

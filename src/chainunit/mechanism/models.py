@@ -284,7 +284,7 @@ class InverseMachine(LinkageModel, MachineModel):
         states = _of_driver(port.states, self.driver_noun)
         return base(
             name=self.direct_name,
-            text=f"The direct model of {self.name}: {port.words.effort} in, motion out.",
+            text=f"The direct model of {self.name}: {port.words[0]} in, motion out.",
             description=self.direct_description or words_on_motion(f"{self.name} that moves by itself", port),
             made=(direct_model, (self,)),
             inverse=self,

@@ -17,12 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.errors import InputError, shown
-from ...core.planar import Motion, Vec2
-from ...groups.block import Row
+from ...core.planar import Vec2
 from ...groups.body import Load
 from ...groups.group import Outline
-from ...groups.joints import LinkageInMotion, Placed, Rail, Rates, Third
-from .gear import GearedLink, GearKind, MeshData
+from ...groups.joints import LinkageInMotion, Rail, Third
+from .gear import GearedLink, GearKind, Mesh, MeshData
 from .joint_kind import BELT, JointEntry, JointParts, JointTable
 
 if TYPE_CHECKING:
@@ -70,51 +69,21 @@ class BeltData(MeshData):
 
     belt: Belt
 
+    def pull(self, m: LinkageInMotion, reaction: Vec2) -> tuple[Any, Vec2]:
+        """The pull of its reaction, and the force on the centre of the pulley."""
+        arm = m.pins[self.pin].p - m.pins[self.centre].p
+        pull = self.belt.along(arm).dot(reaction)
+        return pull, self.belt.side(arm) * pull
+
+    def at_centre(self, m: LinkageInMotion, reaction: Vec2) -> Vec2:
+        """See `MeshData`."""
+        return self.pull(m, reaction)[1]
+
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
         """What the belt does to the other pulley."""
-        belt, end = self.belt, m.pins[self.pin].p
-        arm = end - m.pins[self.centre].p
-        pull = belt.along(arm).dot(reaction)
-        force = belt.side(arm) * -pull
-        return force, (end - m.links[carrier].pin.p).cross(force) - belt.other * pull
-
-    def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """The changes by q of the loads of the belt on both pulleys, at a constant pull: its strands turn with the
-        arm."""
-        turn = 0.0 if self.rolling.arm is None else m.links[self.rolling.arm].t1
-        belt, end = self.belt, m.pins[self.pin]
-        arm = end.p - m.pins[self.centre].p
-        force = belt.side(arm) * belt.along(arm).dot(reaction)
-        more = force.turned() * turn
-        yield self.link, (more, 0.0)
-        if carrier is not None:
-            start = m.links[carrier].pin
-            yield carrier, (-more, -((end.p1 - start.p1).cross(force) + (end.p - start.p).cross(more)))
-
-
-class BeltAt(Placed):
-    """A belt at one position: `side` is the force on the centre of the pulley for a pull of 1, `along` the
-    direction of the pull; see `Mesh` for `base` and `turns`."""
-
-    __slots__ = ("_along", "_base", "_radius", "_side", "_turns")
-
-    def __init__(self, belt: Belt, arm: Vec2, base: Motion, turns: Sequence[Any]) -> None:
-        self._radius, self._side = belt.radius, belt.side(arm)
-        self._along, self._base, self._turns = belt.along(arm), base, turns
-
-    def rows(self) -> list[Row]:
-        """Its row: the pulley turns about its centre, which the pull pushes to the side."""
-        return [{0: self._side.x, 1: self._side.y, 2: self._radius}]
-
-    def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """Its right side, from the centre and the angle, which are known."""
-        base = self._base.p2 if rates else self._base.p1
-        point, turn = before if before is not None else (base, self._turns[len(rates)])
-        return [self._side.dot(point) + self._radius * turn]
-
-    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """The pull [N], along the line of the centres."""
-        return self._along * next(multipliers), None
+        pull, force = self.pull(m, reaction)
+        arm = m.pins[self.pin].p - m.links[carrier].pin.p
+        return -force, -arm.cross(force) - self.belt.other * pull
 
 
 @dataclass
@@ -142,9 +111,9 @@ class BeltedLink(GearedLink):
         bar = self.bar
         return BeltData(self.mesh, bar.name, bar.pin, self.by, self.rolling, self.belt)
 
-    def mesh_at(self, linkage: LinkageInMotion, centre: Motion, turns: Sequence[Any]) -> Placed:
-        """The belt at one position."""
-        return BeltAt(self.belt, linkage.pins[self.mesh].p - centre.p, centre, turns)
+    def mesh_at(self, arm: Vec2, rates: Sequence[Third]) -> Mesh:
+        """The belt at one position: the pulley turns about its centre, which the pull pushes to the side."""
+        return Mesh(self.belt.side(arm), self.belt.radius, rates, self.belt.along(arm))
 
 
 class BeltKind(GearKind):

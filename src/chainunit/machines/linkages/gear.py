@@ -94,6 +94,10 @@ class MeshData:
         """The third derivatives of the centre and of the angle of the wheel."""
         return pins.get(self.centre, ZERO), self.rolling.turn(lambda name: links[name][1])
 
+    def at_centre(self, m: LinkageInMotion, reaction: Vec2) -> Vec2:
+        """The force on the link; it has the moment of one through the pitch point."""
+        return reaction
+
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
         """What the opposite force does to the other wheel."""
         return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
@@ -103,36 +107,39 @@ class MeshData:
         with the arm. On `link`, which starts from its centre, its lever turns as the force does, so that the moment
         stays; on the `carrier` the moment changes, too."""
         turn = 0.0 if self.rolling.arm is None else m.links[self.rolling.arm].t1
-        more = reaction.turned() * turn
+        force = self.at_centre(m, reaction)
+        more = force.turned() * turn
         yield self.link, (more, 0.0)
         if carrier is not None:
             point, start = m.pins[self.pin], m.links[carrier].pin
-            yield carrier, (-more, -((point.p1 - start.p1).cross(reaction) + (point.p - start.p).cross(more)))
+            yield carrier, (-more, -((point.p1 - start.p1).cross(force) + (point.p - start.p).cross(more)))
 
 
 class Mesh(Placed):
-    """The mesh at one position: `arm` goes from the centre of the wheel to the pitch point, `base` is the motion of
-    the centre, and `turns` are the derivatives by q of the angle of the wheel."""
+    """The mesh at one position, whose reaction has the direction `along`. It gives n . v + lever t the same value on
+    both sides, with the velocity v of a point and the speed t of an angle: of the link these are unknowns, with the
+    coefficients of its `row`, and of the other side known `rates`, by order of the derivative by q."""
 
-    __slots__ = ("_arm", "_base", "_turns")
+    __slots__ = ("_along", "_lever", "_n", "_rates", "_row")
 
-    def __init__(self, arm: Vec2, base: Motion, turns: Sequence[Any]) -> None:
-        self._arm, self._base, self._turns = arm, base, turns
+    def __init__(
+        self, n: Vec2, lever: Any, rates: Sequence[Third], along: Vec2, row: Row | None = None
+    ) -> None:
+        self._n, self._lever, self._rates, self._along = n, lever, rates, along
+        self._row = {0: n.x, 1: n.y, 2: lever} if row is None else row
 
     def rows(self) -> list[Row]:
-        """Its row: of the pitch point along the tangent, times the radius."""
-        n = self._arm.turned()
-        return [{0: n.x, 1: n.y, 2: self._arm.squared()}]
+        """Its row."""
+        return [{**self._row}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """Its right side, from the centre and the angle, which are known."""
-        base = self._base.p2 if rates else self._base.p1
-        point, turn = before if before is not None else (base, self._turns[len(rates)])
-        return [self._arm.turned().dot(point) + self._arm.squared() * turn]
+        """Its right side, from the other side."""
+        point, turn = self._rates[len(rates)] if before is None else before
+        return [self._n.dot(point) + self._lever * turn]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """The tangential force of the teeth [N]."""
-        return self._arm.turned() * next(multipliers), None
+        """The tangential force of the teeth, or the pull of a belt [N]."""
+        return self._along * next(multipliers), None
 
 
 @dataclass
@@ -164,9 +171,10 @@ class GearedLink(Group):
         """Its mesh as data."""
         return MeshData(self.mesh, self.bar.name, self.bar.pin, self.by, self.rolling)
 
-    def mesh_at(self, linkage: LinkageInMotion, centre: Motion, turns: Sequence[Any]) -> Placed:
-        """Its mesh with the wheel at its `centre`; `turns` are the derivatives by q of the angle of the wheel."""
-        return Mesh(linkage.pins[self.mesh].p - centre.p, centre, turns)
+    def mesh_at(self, arm: Vec2, rates: Sequence[Third]) -> Mesh:
+        """Its mesh in a place `arm` from its centre; `rates` are those of its centre and its angle, see `Mesh`."""
+        n = arm.turned()
+        return Mesh(n, arm.squared(), rates, n)
 
     @property
     def circles(self) -> tuple[tuple[str, str], ...]:
@@ -196,9 +204,9 @@ class GearedLink(Group):
         u = rotated(rotated(wheel, Vec2(derived[2], derived[3])), arm)
         links = linkage.links
         turns = rolling.turn(lambda name: links[name].t1), rolling.turn(lambda name: links[name].t2)
-        return SolvedGroup(
-            [(centre, u)], (Hinge(0, base=centre), self.mesh_at(linkage, centre, turns)), margin
-        )
+        rates = [*zip((centre.p1, centre.p2), turns, strict=True)]
+        mesh = self.mesh_at(linkage.pins[self.mesh].p - centre.p, rates)
+        return SolvedGroup([(centre, u)], (Hinge(0, base=centre), mesh), margin)
 
 
 class GearKind(SingleLinkKind):
@@ -335,35 +343,12 @@ class RackData(MeshData):
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
-        """The third derivatives of the pin, if it is known, and of the angle of the other link."""
-        return pins.get(self.pin, ZERO), links[self.by or ""][1]
+        """The third derivatives of the pin, if it is known, and of the clockwise angle of the other link."""
+        return pins.get(self.pin, ZERO), -links[self.by or ""][1]
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
         """None: the force keeps its line."""
         return iter(())
-
-
-class RackMesh(Placed):
-    """The mesh of a rack along `d` at one position: its `row`, the signed pitch `radius`, and the derivatives by q of
-    the pin and of the angle of the `other` link."""
-
-    __slots__ = ("_d", "_other", "_radius", "_row")
-
-    def __init__(self, row: Row, d: Vec2, radius: Any, other: Sequence[Third]) -> None:
-        self._row, self._d, self._radius, self._other = row, d, radius, other
-
-    def rows(self) -> list[Row]:
-        """Its row: of the rack along its line, or of the pitch point of the pinion."""
-        return [{**self._row}]
-
-    def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """Its right side, from the other link."""
-        place, turn = self._other[len(rates)] if before is None else before
-        return [self._d.dot(place) - self._radius * turn]
-
-    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """The tangential force of the teeth [N]."""
-        return self._d * next(multipliers), None
 
 
 @dataclass
@@ -417,15 +402,14 @@ class RackedLink(Group):
         if self.rail is None:
             centre, rack = linkage.pins[self.bar.pin], linkage.pins[self.mesh]
             turned = d.dot(there - rack.p) / r
-            cosine, rates = xp.cos(turned), [(rack.p1, 0.0), (rack.p2, 0.0)]
+            cosine, rates, row = xp.cos(turned), [(rack.p1, 0.0), (rack.p2, 0.0)], {0: d.x, 1: d.y, 2: -r}
             u = Vec2(xp.cos(turned + self.place), xp.sin(turned + self.place))
-            mesh = RackMesh({0: d.x, 1: d.y, 2: -r}, d, r, rates)
             pose, first = (centre, u), Hinge(0, base=centre)
         else:
             pinion, rail = linkage.links[self.by], self.rail.at_position(linkage.links)
             turned = rotated(pinion.u, mirrored(there))
             way = self.place - d.dot(rail.pin.p) - r * xp.atan2(turned.y, turned.x)
-            cosine, mesh = turned.x, RackMesh({3: 1}, d, r, [(ZERO, pinion.t1), (ZERO, pinion.t2)])
+            cosine, rates, row = turned.x, [(ZERO, -pinion.t1), (ZERO, -pinion.t2)], {3: 1}
             pose, first = (rail.pin.p + d * way, rail.u), Guide(0, d, way, d * way, rail)
         margin = (
             (cosine - _LEAST_COSINE)
@@ -433,7 +417,7 @@ class RackedLink(Group):
             * r
             / xp.sqrt(r * r + _LEAST_RADIUS**2)
         )
-        return SolvedGroup([pose], (first, mesh), margin)
+        return SolvedGroup([pose], (first, Mesh(d, r, rates, d, row)), margin)
 
 
 class RackKind(SingleLinkKind):
