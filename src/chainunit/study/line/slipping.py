@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.quantities import Layout
 from ..analysis import Analysis
+from ..arrays import Dataset
 from ..conditions import given
 from ..rules import Rule
 from ..verdict import START, STEADY
@@ -18,8 +19,6 @@ from .placed import PlacedPart
 from .slip_plan import SlipPlan
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..config import FileReading
     from ..record import StudyRuns
 
@@ -73,7 +72,7 @@ class SlipRun:
     variables: Mapping[str, Any]
 
     @classmethod
-    def read(cls, placed: PlacedPart, run: xr.Dataset) -> SlipRun:
+    def read(cls, placed: PlacedPart, run: Dataset) -> SlipRun:
         """The variables of the part in a run."""
         prefix = f"{placed.name}."
         x = {str(name).removeprefix(prefix): run[name].values for name in run if str(name).startswith(prefix)}
