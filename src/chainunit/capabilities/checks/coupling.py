@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.results import OWN, derived, part, result
 from ...reading.text import number
 from ...study.arrays import Dataset
+from ...study.drive import Drive
 from ...study.readings import load_inertia, torque_before_gear
 from ...study.record import StudyFindings, StudyRuns
 from ...study.remark import note, warning
@@ -31,9 +32,6 @@ from .plan import CheckPlan
 from .row import CheckRow, CheckRule, Checks
 from .runs import largest
 from .tables import OF_ROW, FlexibleCouplingTable
-
-if TYPE_CHECKING:
-    from ...study.drive import Drive
 
 _TURN = 2.0 * math.pi
 FREQUENCY = 10.0

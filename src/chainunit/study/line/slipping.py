@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,15 +12,13 @@ from ...core.quantities import Layout
 from ..analysis import Analysis
 from ..arrays import Dataset
 from ..conditions import given
+from ..config import FileReading
+from ..record import StudyRuns
 from ..rules import Rule
 from ..verdict import START, STEADY
 from .part import PartOfLine
 from .placed import PlacedPart
 from .slip_plan import SlipPlan
-
-if TYPE_CHECKING:
-    from ..config import FileReading
-    from ..record import StudyRuns
 
 _RIGID = ("driveline", "observer", "watch", "identify")
 """Tables whose models have no slip between them and the motor."""
