@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..core.descriptions import of_driver
 from ..core.engines import numpy_
 from ..reading.text import forms
 from ..reading.text import number as number_words
+from ..study.arrays import Dataset
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
@@ -29,9 +30,6 @@ from .lines import Line, capital, filled, join, line
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
 from .study_motion import machine_state
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PICTURES = Pictures()
 _MOTION = ("phi", "w", "a")
@@ -193,7 +191,7 @@ def histogram(time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndar
     return edges, counts / np.sum(counts)
 
 
-def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
+def _averages(steady: Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
     yield fig.Mark(mean(steady, torque), "mean", look="mark")
     yield fig.Mark(math.sqrt(mean(steady, torque**2)), "RMS", look="reference")
 
@@ -335,7 +333,7 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
     )
 
 
-def _coasting(setup: StudySetup, run: xr.Dataset, event: float) -> tuple[fig.Curve, float | None]:
+def _coasting(setup: StudySetup, run: Dataset, event: float) -> tuple[fig.Curve, float | None]:
     """The speed of the machine behind the open coupling, and the time from which on it stands [s]; None if it never
     turns."""
     time, speed = run["time"].values - event, crank_speed(setup.drive, run)
@@ -368,7 +366,7 @@ def _marks(runs: StudyRuns, name: str, labelled: bool) -> list[fig.Item]:
     return []
 
 
-def _load_change(drive: Drive, run: xr.Dataset) -> tuple[float, float] | None:
+def _load_change(drive: Drive, run: Dataset) -> tuple[float, float] | None:
     """The first and the last instant at which a load of the machine or the supply of the motor changes [s]; None if
     neither does."""
     loads = (name for name in drive.machine.model.input_layout.names if name not in _MOTION)

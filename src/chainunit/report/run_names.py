@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
+from ..study.arrays import Dataset
 from ..study.event import in_groups
 from ..study.readings import has_turn
 from ..study.record import StudyRuns
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COASTING = "_coasting"
 """The end of the name of a run of the machine alone, after the torque limiter has opened; the name begins with that
@@ -50,7 +47,7 @@ def has_steady_turns(runs: StudyRuns) -> bool:
     return "steady" in runs.answers and has_turn(runs.drive, runs.steady)
 
 
-def from_event(runs: StudyRuns, run: str) -> xr.Dataset:
+def from_event(runs: StudyRuns, run: str) -> Dataset:
     """A run from its overload on; the whole run without one."""
     return runs.series[run].sel(time=slice(event_time(runs, run), None))
 

@@ -11,15 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from ..work.progress import TaskProgress
+from .drive import Drive
 from .record import Findings as Findings
-
-if TYPE_CHECKING:
-    from .drive import Drive
-    from .record import StudyRecord
-    from .rig import Rig
+from .record import StudyRecord
+from .rig import Rig
 
 
 def is_examined(part: str, findings: Mapping[str, Findings]) -> bool:

@@ -12,18 +12,16 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from ..core.errors import InputError
+from ..machines.machine import Machine
+from .analysis import Analysis
+from .config import Config, FileReading
+from .cycle import Cycle
+from .drive import Drive
 from .file_section import FileSection
-
-if TYPE_CHECKING:
-    from ..machines.machine import Machine
-    from .analysis import Analysis
-    from .config import Config, FileReading
-    from .cycle import Cycle
-    from .drive import Drive
-    from .rules import Rule
+from .rules import Rule
 
 
 class PartBeside(ABC):

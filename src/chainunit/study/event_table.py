@@ -18,7 +18,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -31,9 +31,7 @@ from ..reading.lists import Entry, read_entries
 from ..reading.tables import given_values, instance, read_table, schema
 from .event import TYPES, AnySide, Event, filled
 from .events import Jam
-
-if TYPE_CHECKING:
-    from .rig import Rig
+from .rig import Rig
 
 RESERVED = ("start_up", "settling", "steady", "constant", "unfinished")
 """Names that an event may not have, as other runs of a study have them."""

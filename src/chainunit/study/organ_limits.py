@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from ..machines.chain_unit import RODS, SIDES, RodName, SideLoads
 from ..machines.machine import Machine
 from ..reading.results import derived, part, result
 from .arrays import Dataset
-
-if TYPE_CHECKING:
-    from .drive import Drive
-
+from .drive import Drive
 
 ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
 """Crank speeds, relative to the lowest natural frequency of the organ, up to which two bars give the rocker

@@ -8,19 +8,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from ..fmu.backends import Backend
+from ..machines.machine import Machine
 from . import verdict
 from .conditions import Condition, is_one_of
+from .cycle import Cycle
 from .organ_limits import has_empty_side, slack_and_mode
+from .record import StudyRecord
 from .registry import organ_models
 from .verdict import Verdict
-
-if TYPE_CHECKING:
-    from ..fmu.backends import Backend
-    from ..machines.machine import Machine
-    from .cycle import Cycle
-    from .record import StudyRecord
 
 USUAL = "two-bar"
 

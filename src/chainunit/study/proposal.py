@@ -7,18 +7,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..drives.catalogue import CatalogueMotor
+from ..fmu.backends import Backend
+from ..machines.machine import Machine
+from ..work.progress import TaskProgress
 from .drive import Drive
-from .operation import DriveTables
-
-if TYPE_CHECKING:
-    from ..fmu.backends import Backend
-    from ..machines.machine import Machine
-    from ..work.progress import TaskProgress
-    from .event import Event
-    from .operation import OperatingConditions
+from .event import Event
+from .operation import DriveTables, OperatingConditions
 
 
 @dataclass(frozen=True)

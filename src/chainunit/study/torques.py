@@ -4,7 +4,7 @@ the output of the gear; in a run, in the events of a study, and in its normal du
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +16,8 @@ from .drive import Drive
 from .event import Role
 from .proposal import DutyPeak
 from .readings import crank_torque, load_inertia
+from .record import StudyRecord, StudyRuns
 from .verdict import START, STEADY
-
-if TYPE_CHECKING:
-    from .record import StudyRecord, StudyRuns
-
 
 PeakOf = Callable[[Drive, Dataset], float]
 """The peak of a torque in a run, at the crank [N m]."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.results import OWN, derived, part, result
 from ...reading.text import number
+from ...study.arrays import Dataset
+from ...study.drive import Drive
 from ...study.readings import load_inertia, torque_before_gear
 from ...study.record import StudyFindings, StudyRuns
 from ...study.remark import note, warning
@@ -30,11 +32,6 @@ from .plan import CheckPlan
 from .row import CheckRow, CheckRule, Checks
 from .runs import largest
 from .tables import OF_ROW, FlexibleCouplingTable
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from ...study.drive import Drive
 
 _TURN = 2.0 * math.pi
 FREQUENCY = 10.0
@@ -252,7 +249,7 @@ def check_coupling(checks: Checks, coupling: CouplingCheck, table: FlexibleCoupl
         checks.check(rule, "coupling", "checks.flexible_coupling", coupling, limit, why, run=run)
 
 
-def inertias(drive: Drive, turns: xr.Dataset, is_on_crank: bool) -> tuple[float, float]:
+def inertias(drive: Drive, turns: Dataset, is_on_crank: bool) -> tuple[float, float]:
     """Mean inertia before the coupling and behind it [kg m2], at its shaft. Behind a part that slips, wheels, pulleys
     and gear are before a coupling on the crank's shaft."""
     ratio, part = drive.ratio if is_on_crank else 1.0, drive.geared_line.before_gear
@@ -277,7 +274,7 @@ def find(runs: StudyRuns, plan: CheckPlan, checks: Checks) -> CouplingCheck | No
     is_on_crank = plan.coupling_place == "crank"
     ratio = drive.ratio if is_on_crank else 1.0
 
-    def torque_of(run: xr.Dataset) -> Any:
+    def torque_of(run: Dataset) -> Any:
         return gear_torque(drive, run) if is_on_crank else torque_before_gear(drive, run)
 
     before, behind = inertias(drive, turns, is_on_crank)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
+from ...study.arrays import Dataset
 from ...study.record import StudyRecord
 from ...study.relay import (
     CLASSES,
@@ -32,9 +33,6 @@ from ...study.starts import StartFindings
 from ...study.verdict import STEADY
 from .plan import CheckPlan
 from .row import CheckRule, Checks
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
 _STALL = f"{_CLAUSE}; locked-rotor time of the maker of the motor"
@@ -214,7 +212,7 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
         return None
     before = share * study.runs.answers[STEADY].current_rms
 
-    def current_of(run: xr.Dataset) -> Any:
+    def current_of(run: Dataset) -> Any:
         current = np.abs(run[f"motor.{drive.motor.current}"].values)
         return share * (drive.star.winding_current(run["time"].values, current) if in_phases else current)
 

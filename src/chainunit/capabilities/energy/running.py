@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,15 +20,13 @@ from ...core.messages import unit_behind
 from ...core.quantities import Layout, Value, declaration, quantity
 from ...drives.nameplate import Nameplate
 from ...machines.machine import Machine
+from ...study.arrays import Dataset
 from ...study.drive import Drive
 from ...study.readings import crank_angle, crank_speed, gear_loss, shaft_power
 from ...study.rig import Rig
 from ...study.start_up import start_up
 from ...study.window import Window
 from .inverter import loss
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _HELD = 1e6
 """Factor on the heat capacity of a winding that keeps its temperature."""
@@ -65,7 +63,7 @@ class InverterRating:
     losses: tuple[float, ...]
     plate: Nameplate
 
-    def loss(self, run: xr.Dataset) -> Any:
+    def loss(self, run: Dataset) -> Any:
         """The loss over a run [W], shape (time,). The torque-producing current is in proportion to the torque, and in
         field weakening to the frequency, too."""
         frequency = run["motor.supply.frequency"].values / self.plate.frequency
@@ -79,7 +77,7 @@ class SteadyLoad:
     its supply at moments [W]. `lasts` tells whether its means stand for running that lasts."""
 
     losses: Losses
-    turns: xr.Dataset
+    turns: Dataset
     given_back: float
     lasts: bool
 
@@ -167,7 +165,7 @@ def _machine(w: Window, feed: Any) -> dict[str, float]:
     smooth = machine.replace(dict.fromkeys(names, 0.0))
     values = Layout(type(feed)).by_name(feed)
 
-    def processing(drive: Drive, run: xr.Dataset) -> Any:
+    def processing(drive: Drive, run: Dataset) -> Any:
         motion = {"phi": crank_angle(drive, run) * drive.ratio, "w": crank_speed(drive, run) * drive.ratio}
         return smooth.evaluate({**motion, **values})["dissipated_power"]
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...drives.catalogue import CatalogueMotor
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
+from ...study.arrays import Dataset
 from ...study.catalogue_drive import with_inertia
 from ...study.cycle import needed_inertia
 from ...study.drive import Drive
@@ -29,9 +30,6 @@ from ...study.start_up import start_up
 from ...study.turn import TurnFindings
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
 from .wheel import FlywheelAnswers, Wheel
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 CLOSE = 0.03
 """The fluctuation with the least flywheel lies below the permitted one by at most this share of it."""
@@ -202,7 +200,7 @@ def _wheel(
     flywheel: float,
     steady: Answers,
     start: Answers,
-    turns: xr.Dataset,
+    turns: Dataset,
     residual: float,
 ) -> Wheel:
     """A flywheel with its answers; a machine that stands or creeps has no answers of steady running."""

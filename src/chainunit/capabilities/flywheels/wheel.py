@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import derived, part, result
+from ...study.arrays import Dataset
 from ...study.limits import Check
 from ...study.measures import same_measure
 from ...study.window import closes
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @declaration
@@ -49,7 +46,7 @@ class Wheel:
     `checks` are the limits of the motor, by name."""
 
     answers: FlywheelAnswers = part(inline=True)
-    turns: xr.Dataset
+    turns: Dataset
     checks: Mapping[str, Check]
 
     @property

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ...core.quantities import Value, declaration, quantity, variables
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import Estimate, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
+from ...study.arrays import Dataset
 from ...study.block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
 from ...study.drive import Drive
 from ...study.event import AnySide, Event
@@ -43,10 +44,6 @@ from ...work.job import Job, ResultVariable, made_anew
 from ...work.progress import TaskProgress
 from ...work.runner import run as run_job
 from .table import RandomPlan
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 OUTCOMES = {"trips": "the torque limiter opens", "stalls": "the {driver} stands at the end"}
 """By switch of a run, the words on a run that ends so badly."""
@@ -290,7 +287,7 @@ _MADE_ANEW = note("runs-made-anew", "Overloads at random: {text}.")
 class MonteCarloResult(Findings):
     """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
 
-    dataset: xr.Dataset
+    dataset: Dataset
     file: Path
     method: str = part("how the runs are made: compiled, or by the FMUs as cs or me")
     earlier_runs: int = 0

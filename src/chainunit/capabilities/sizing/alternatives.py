@@ -7,7 +7,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ...core.errors import InterruptedRunError, RunError
 from ...drives.induction_motor import SoftStart
 from ...drives.slip_clutch import SlipClutch
 from ...machines.chain_unit import SIDES
-from ...study.arrays import peak
+from ...study.arrays import Dataset, peak
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.cycle import cycle
 from ...study.drive import Drive
@@ -45,9 +45,6 @@ from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
 from .table import SizingPlan
 from .task import SizingTask
 from .trial import try_motor
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.3, 10.0))
 """Share of the voltage and ramp [s] of the soft starters that are tried, in this order."""
@@ -241,7 +238,7 @@ def _tried(
     way: Way,
     numbers: WayNumbers,
     overloads: Mapping[str, float],
-    runs: Mapping[str, xr.Dataset] | None = None,
+    runs: Mapping[str, Dataset] | None = None,
 ) -> Alternative:
     """A way whose coupling was tried in the `overloads`, peaks by name; for `runs` see `effects`."""
     if numbers.setting is None:
@@ -293,12 +290,12 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
     return _tried(study, Way.INVERTER, result, overloads, shocks)
 
 
-def _runs(runs: StudyRuns, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
+def _runs(runs: StudyRuns, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[str, Dataset]]:
     """The largest torque of normal duty of another drive by `peak_of`, at the crank [N m], and its runs with the
     overloads from their begin on, by name."""
     operation = rig.operation
-    duty: list[tuple[str, xr.Dataset]] = []
-    shocks: dict[str, xr.Dataset] = {}
+    duty: list[tuple[str, Dataset]] = []
+    shocks: dict[str, Dataset] = {}
     with rig.from_rest() as simulation:
         started = start_up(rig, simulation, lambda time: None, {})
         rig = started.rig
@@ -320,7 +317,7 @@ def _runs(runs: StudyRuns, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[str, 
     return duty_peak(rig.drive, [(STEADY, steady), *duty], peak_of).torque, shocks
 
 
-def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None:
+def slip_run(rig: Rig, start: StartNumbers, setting: float) -> Dataset | None:
     """A start direct on line from the crank angle of `start`, the same start without a clutch, with a slip clutch of
     the `setting` [N m at the crank] behind rotor and added inertia, until the clutch sticks and the machine has its
     speed; None where it slips on for three times as long as the start takes. The variables of the clutch are
@@ -341,7 +338,7 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     system = in_line({**behind, "clutch": ModelComponent(SlipClutch, p), "motor": parts["motor"]})
     signals = rig.signals(ramp=True)
     assert start.start_time is not None
-    pieces: list[xr.Dataset] = []
+    pieces: list[Dataset] = []
     piece, state = 0.25 * start.start_time + _SWING, None
     full, slip_time = STARTED * rig.operation.crank_speed * drive.driven_machine.ratio, 0.0
     for k in range(12):
@@ -410,7 +407,7 @@ def _rocker_until(runs: StudyRuns, setting: Setting) -> float | None:
     return max(peaks, default=None)
 
 
-def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
+def on_motor_side(drive: Drive, run: Dataset) -> float:
     """Peak torque in a run on a coupling between rotor and flywheel on the motor's shaft, at the crank [N m]: that
     behind the inertia, and the torque that accelerates it and the gear at the rotor and overcomes the drag of this
     gear, as the gear passes it on."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...drives.catalogue_couplings import CatalogueCoupling
-from ...study.arrays import peak
+from ...study.arrays import Dataset, peak
 from ...study.coupling import hardest_start, pull_out
 from ...study.drive import Drive
 from ...study.event import Role
@@ -20,9 +19,6 @@ from ...study.torques import at_gear, gear_torque, peaks_in_events, running_peak
 from ...study.verdict import STEADY
 from .parts import coupling_for
 from .protection import CouplingEffect, Setting, goal
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCoupling] = ()) -> Setting | None:
@@ -68,7 +64,7 @@ def coupling_of(
 def effects(
     study: StudyRecord,
     setting: float,
-    runs: Mapping[str, xr.Dataset] | None = None,
+    runs: Mapping[str, Dataset] | None = None,
     release: float | None = None,
 ) -> dict[str, CouplingEffect]:
     """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
@@ -87,7 +83,7 @@ def effects(
     }
 
 
-def _trip_time(drive: Drive, run: xr.Dataset, setting: float) -> float | None:
+def _trip_time(drive: Drive, run: Dataset, setting: float) -> float | None:
     """The time at which the torque of the motor's shaft passes the `setting` [N m at the crank]; None if it never
     does."""
     time, torque = run["time"].values, drive.at_crank(np.abs(run[drive.motor_torque].values))
@@ -98,7 +94,7 @@ def _trip_time(drive: Drive, run: xr.Dataset, setting: float) -> float | None:
     return float(np.interp(setting, torque[around], time[around]))
 
 
-def _effect(drive: Drive, run: xr.Dataset, trip: float, release: float, limit: float) -> CouplingEffect:
+def _effect(drive: Drive, run: Dataset, trip: float, release: float, limit: float) -> CouplingEffect:
     """The effect of a coupling that opens at the time `trip` [s] in a `run` without one. Both runs are the same until
     no torque passes it any more."""
     time, end = run["time"].values, trip + release

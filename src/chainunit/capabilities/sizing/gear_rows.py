@@ -6,7 +6,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,16 +13,13 @@ from ...core.errors import InputError
 from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_rating import GearRating
 from ...drives.gear_ratios import GearUnit, nearest
-from ...study.arrays import peak
+from ...study.arrays import Dataset, peak
 from ...study.bearings import driver_bearing, pin_force
 from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION, Check
 from ...study.readings import shaft_power
 from .candidate import Candidate
 from .table import PRICE
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 OWN_KEYS = (
     "sizing.gear_kind",
@@ -106,7 +102,7 @@ def rows_for(
 
 
 def gear_checks(
-    rating: GearRating, drive: Drive, running: Sequence[xr.Dataset], cases: Sequence[tuple[float, xr.Dataset]]
+    rating: GearRating, drive: Drive, running: Sequence[Dataset], cases: Sequence[tuple[float, Dataset]]
 ) -> dict[str, Check]:
     """The checks of a gear beside those of its torque, as far as its ratings have their limits.
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ...drives.catalogue import CatalogueMotor
 from ...drives.induction_steady import volts_per_hertz
 from ...drives.motor import T_RATED
 from ...machines.chain_unit import SideName
-from ...study.arrays import peak
+from ...study.arrays import Dataset, peak
 from ...study.drive import Drive
 from ...study.events import one_sided_event
 from ...study.inverter import need_of
@@ -49,9 +49,6 @@ from .gear_rows import gear_checks
 from .table import Sizing
 from .task import SizingTask
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 _GAP = "motor.air_gap_tau"
 _LATE = 1.5
 """Time after which the start of a trial is not awaited any more, in parts of the permitted one."""
@@ -69,10 +66,10 @@ class Trial:
     motor: CatalogueMotor
     drive: Drive
     heavier: SideName | None
-    start: xr.Dataset
-    steady: xr.Dataset
-    shifts: tuple[tuple[str, xr.Dataset], ...]
-    one_sided: Mapping[SideName, xr.Dataset]
+    start: Dataset
+    steady: Dataset
+    shifts: tuple[tuple[str, Dataset], ...]
+    one_sided: Mapping[SideName, Dataset]
     starts: Sequence[StartNumbers] = ()
     """starts from all crank angles; none where the start from the angle 0 stands for them"""
 
@@ -85,7 +82,7 @@ class Trial:
         return None if others is None else max(self._first, others)
 
     @cached_property
-    def _from_rest(self) -> xr.Dataset:
+    def _from_rest(self) -> Dataset:
         """The run from rest to the end of steady running: a start may end while the motor settles."""
         settling = [run for name, run in self.shifts if name == SETTLING]
         return join([self.start, *settling, self.steady])
@@ -170,7 +167,7 @@ class Trial:
         """Mean speed of the machine, at the motor [rad/s]: less than that of the motor by the slip of the line."""
         return float(np.mean(self._speed_behind(self.steady)))
 
-    def _speed_behind(self, run: xr.Dataset) -> Any:
+    def _speed_behind(self, run: Dataset) -> Any:
         name, ratio = self.drive.crank_output("w")
         return run[name].values * (self.drive.ratio / ratio)
 
@@ -276,12 +273,12 @@ class Trial:
         return self.task.plan.demands
 
     @property
-    def _running(self) -> tuple[xr.Dataset, ...]:
+    def _running(self) -> tuple[Dataset, ...]:
         """The runs of running: steady, with all feed on each side, and those in which the feed comes or moves."""
         return (self.steady, *(run for _, run in self.shifts), *self.one_sided.values())
 
     @property
-    def _cases(self) -> list[tuple[float, xr.Dataset]]:
+    def _cases(self) -> list[tuple[float, Dataset]]:
         """The runs of the duty, each with its share of the time."""
         if self.heavier is None:
             return [(1.0, self.steady)]

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ...core.native.compilers import COMPILERS
 from ...core.quantities import Layout, Quantity, Variable, variables
 from ...machines.machine import Machine
 from ...reading.results import InUnit
+from ...study.arrays import Dataset
 from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
 from ...study.choice import drive_of
 from ...study.config import Config
@@ -40,9 +41,6 @@ from ...work.runner import check_scheduler
 from ...work.runner import run as run_job
 from .plan import SweepPlan
 from .table import SPEED
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _RATIO = "machine.ratio"
 TITLE = "points of the sweep"
@@ -111,7 +109,7 @@ class SweepTask:
         """The codes of the reasons by kind and subject."""
         return {(reason.kind, reason.subject): code for code, reason in enumerate(self.reasons)}
 
-    def turns(self, values: Mapping[str, Any]) -> xr.Dataset:
+    def turns(self, values: Mapping[str, Any]) -> Dataset:
         """The quantities of a turn at points with these values by full name, each of shape (points,)."""
         import xarray as xr
 
@@ -136,7 +134,7 @@ class SweepTask:
             on_host=True,
         )
 
-    def codes_of_turns(self, table: xr.Dataset) -> Any:
+    def codes_of_turns(self, table: Dataset) -> Any:
         """The codes of the sweep for those of `turns`, shape (points,); `make_points` names a swept value that is
         outside its bounds."""
         code, count = table.reason.values, len(reasons_of(self.machine.model))
@@ -378,21 +376,21 @@ class SweepFindings:
         return InUnit(value, self.variables[name].unit, self.variables[name].kind)
 
     @cached_property
-    def points(self) -> xr.Dataset:
+    def points(self) -> Dataset:
         """All points over the dimension ``point``, by the names of the study: parameters, results and ``reason``. The
         values are read when they are used."""
         dataset = self.outcome.dataset.rename({plain_name(name): name for name in self.variables})
         dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
         return dataset.set_coords([parameter.name for parameter in self.plan.parameters])
 
-    def parts(self, names: Sequence[str]) -> Iterator[tuple[int, xr.Dataset]]:
+    def parts(self, names: Sequence[str]) -> Iterator[tuple[int, Dataset]]:
         """The variables `names` of all points in parts, each with the number of its first point."""
         points = self.points[[*names]]
         for begin in range(0, points.sizes["point"], _PART):
             yield begin, points.isel(point=slice(begin, begin + _PART)).load()
 
     @cached_property
-    def dataset(self) -> xr.Dataset:
+    def dataset(self) -> Dataset:
         """The results by the names of the study: over the parameters of a grid, else over ``point``, with the
         parameters as coordinates."""
         import xarray as xr

@@ -4,7 +4,7 @@ the rocker has carried by then."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,14 +12,11 @@ from ...core.quantities import Value, declaration, quantity
 from ...machines.chain_unit import SIDES
 from ...reading.results import derived, part, result
 from ...study.analysis import Analysis, Findings, Work
-from ...study.arrays import peak
+from ...study.arrays import Dataset, peak
 from ...study.drive import Drive
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord, StudyRuns
 from ...study.remark import note, warning
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 AT_LIMIT = 0.99
 """Share of the limit of its current from which a motor counts as at the limit."""
@@ -157,7 +154,7 @@ class ObserverAnalysis(Analysis):
         )
 
 
-def _observed(steady: xr.Dataset, normal: float) -> Observed:
+def _observed(steady: Dataset, normal: float) -> Observed:
     """The observer in steady running: its errors and thresholds; `normal` is the usual rocker torque [N m]."""
     estimate = steady["observer.imbalance.feed"].values
     left, right = (steady[f"machine.{side}.material_mass"].values for side in SIDES)
@@ -170,7 +167,7 @@ def _observed(steady: xr.Dataset, normal: float) -> Observed:
     )
 
 
-def _is_alarm(run: xr.Dataset) -> Any:
+def _is_alarm(run: Dataset) -> Any:
     """Whether the observer raises an alarm, at each row of a run."""
     return np.abs(run["observer.alarm"].values) > 0.5
 
@@ -180,13 +177,13 @@ def _first(time: Any, is_noticed: Any) -> float | None:
     return next(map(float, time[is_noticed]), None)
 
 
-def _side(run: xr.Dataset) -> str:
+def _side(run: Dataset) -> str:
     """The side of the first alarm; empty without an alarm."""
     first = run["observer.alarm"].values[_is_alarm(run)][:1]
     return "" if not first.size else "left" if first[0] > 0.0 else "right"
 
 
-def _notices(runs: StudyRuns, name: str, run: xr.Dataset, normal: float) -> Iterator[tuple[str, Notice]]:
+def _notices(runs: StudyRuns, name: str, run: Dataset, normal: float) -> Iterator[tuple[str, Notice]]:
     """The notice of each device that the drive has, by its name. `run` is that of the event from its begin on."""
     drive, motor, answers = runs.drive, runs.drive.motor, runs.answers[name]
     time, torque = run["time"].values - runs.event_times[name], np.abs(run["machine.rocker.tau"].values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
 from ..conditions import given, is_one_of
+from ..drive import Drive
 from ..event import Role
 from ..file_section import FileSection
 from ..record import StudyRecord
@@ -27,9 +28,6 @@ from ..remark import note, warning
 from ..rules import Rule
 from .slip_plan import SlipPlan
 from .slipping import SlippingPart, parts_of_runs
-
-if TYPE_CHECKING:
-    from ..drive import Drive
 
 _IRON, _FILLED, _WIDTH = 7200.0, 0.5, 0.35
 """A pulley: density of cast iron [kg/m3], share of a solid disc, width over the diameter of the motor's pulley."""

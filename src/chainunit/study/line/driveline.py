@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -17,18 +17,16 @@ from ...drives.driveline import CardanDriveline, Mounted
 from ...drives.line_table import CORNER, SHAFTS, Damping, form, line_values
 from ...drives.shafts import SECTIONS as PROFILES
 from ...drives.shafts import Shaft
+from ..analysis import Analysis
 from ..conditions import Schema, is_one_of
+from ..config import FileReading
+from ..cycle import Cycle
+from ..drive import Drive
 from ..file_section import FileSection, TableForm
+from ..keys import Key
+from ..record import StudyRecord
 from .part import PartOfLine
-
-if TYPE_CHECKING:
-    from ..analysis import Analysis
-    from ..config import FileReading
-    from ..cycle import Cycle
-    from ..drive import Drive
-    from ..keys import Key
-    from ..record import StudyRecord
-    from .placed import PlacedPart
+from .placed import PlacedPart
 
 PLACES = ("crank", "motor")
 """The places of a driveline: on the crank's shaft behind the gear, or on the motor's shaft before it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...drives.fluid_coupling import FluidCoupling, FluidCouplingData
 from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
+from ..drive import Drive
 from ..file_section import FileSection
 from ..readings import motor_pull_out
 from ..record import StudyRecord
@@ -21,9 +22,6 @@ from ..verdict import STEADY
 from ..window import Phase
 from .slip_plan import SlipPlan
 from .slipping import SlippingPart, SlipRun, parts_of_runs
-
-if TYPE_CHECKING:
-    from ..drive import Drive
 
 _PUMP, _TURBINE = 20.0, 10.0
 """Inertia of pump wheel and housing and of the turbine wheel over the rated torque by the square of the rated speed

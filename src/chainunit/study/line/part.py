@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from ...core.model import Model
 from ..capability import StudyCapability
-
-if TYPE_CHECKING:
-    from ..cycle import Cycle
-    from ..drive import Drive
-    from ..record import StudyRecord
-    from .placed import PlacedPart
+from ..cycle import Cycle
+from ..drive import Drive
+from ..record import StudyRecord
+from .placed import PlacedPart
 
 
 class PartOfLine(StudyCapability):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,9 @@ from ...drives.cardan import Cardan, ShaftLine, frozen_frequency, largest_freque
 from ...drives.driveline import Parameters
 from ...reading.results import part, result
 from ...reading.text import number
-from ..arrays import peak
+from ..arrays import Dataset, peak
 from ..drive import Drive
 from ..readings import turns_made
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 LONGEST_STEP = 0.3
 """Largest product of communication step and natural frequency; above it the coupling excites the vibration
@@ -164,14 +161,14 @@ def remedies(line: ShaftLine) -> list[str]:
     return changes
 
 
-def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
+def rigid_torque(drive: Drive, rigid: Dataset) -> Any:
     """Torque in shaft 2 [N m], shape (time,), in the run `rigid` of the rigid drive."""
     line, (_, behind) = driveline_of(drive), drive.whole_line.around("driveline")
     driven = behind.parts[0].name if behind else "machine"
     return line.ratio * rigid[f"{driven}.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
 
 
-def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
+def with_rigid(drive: Drive, run: Dataset, rigid: Dataset) -> Dataset:
     """The `run`, with the torque in shaft 2 in the same run of the rigid drive added."""
     torque = rigid_torque(drive, rigid)
     # a coupling opens at different times in the two runs; after that of the rigid drive there is no value
@@ -182,8 +179,8 @@ def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
 
 def shaft_answers(
     drive: Drive,
-    run: xr.Dataset,
-    rigid: xr.Dataset,
+    run: Dataset,
+    rigid: Dataset,
     exponent: float,
     steady_damage_per_turn: float | None = None,
 ) -> tuple[ShaftAnswers, Cycles, float]:

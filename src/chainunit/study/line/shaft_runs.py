@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +16,12 @@ from ...reading.results import part, result
 from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work, is_examined
+from ..arrays import Dataset
 from ..drive import Drive
 from ..record import StudyFindings, StudyRecord, StudyRuns
 from ..remark import note, warning
 from .rigid_line import HOLDS_FROM, RigidLine
 from .shaft import AMPLIFIED, UNEVEN, Cycles, ShaftAnswers, driveline_of, remedies, shaft_answers, with_rigid
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @result
@@ -68,7 +66,7 @@ class ShaftAnalysis(Analysis):
         return _findings(study, twins)
 
 
-def _rigid_runs(runs: StudyRuns, work: Work) -> dict[str, xr.Dataset]:
+def _rigid_runs(runs: StudyRuns, work: Work) -> dict[str, Dataset]:
     """The runs of the rigid drive, at the same times and with the same coupling."""
     rig = replace(work.rig, twin=partial(rigid, line="driveline"))
     events = {name: runs.events[name] for name in runs.event_times}
@@ -88,7 +86,7 @@ def _rigid_runs(runs: StudyRuns, work: Work) -> dict[str, xr.Dataset]:
     return twins
 
 
-def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindings:
+def _findings(study: StudyRecord, twins: Mapping[str, Dataset]) -> ShaftFindings:
     """The findings of the shaft in start-up, steady running and each event, beside the `twins`, the runs of the rigid
     drive at the same times."""
     setup, runs, steady = study.setup, study.runs, study.runs.steady

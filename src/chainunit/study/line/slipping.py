@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.quantities import Layout
 from ..analysis import Analysis
+from ..arrays import Dataset
 from ..conditions import given
+from ..config import FileReading
+from ..record import StudyRuns
 from ..rules import Rule
 from ..verdict import START, STEADY
 from .part import PartOfLine
 from .placed import PlacedPart
 from .slip_plan import SlipPlan
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from ..config import FileReading
-    from ..record import StudyRuns
 
 _RIGID = ("driveline", "observer", "watch", "identify")
 """Tables whose models have no slip between them and the motor."""
@@ -73,7 +70,7 @@ class SlipRun:
     variables: Mapping[str, Any]
 
     @classmethod
-    def read(cls, placed: PlacedPart, run: xr.Dataset) -> SlipRun:
+    def read(cls, placed: PlacedPart, run: Dataset) -> SlipRun:
         """The variables of the part in a run."""
         prefix = f"{placed.name}."
         x = {str(name).removeprefix(prefix): run[name].values for name in run if str(name).startswith(prefix)}
