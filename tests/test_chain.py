@@ -148,7 +148,7 @@ def test_modes_are_those_of_the_recursion():
     modes = hanging.modes(lengths, masses * G, rest, G)
     rods = Rods(lengths, masses, np.zeros(9))
     end = end_motion(rods, list(rest.theta), [0.0] * 8, MATH)
-    theta, omega = close(MATH, rods, list(rest.theta + 1e-4 * modes.shape[0]), [0.0] * 8, end)
+    theta, omega, _ = close(MATH, rods, list(rest.theta + 1e-4 * modes.shape[0]), [0.0] * 8, end)
 
     def rates(_, y):
         return [*y[8:], *Chain(MATH, rods, list(y[:8]), list(y[8:]), G, 0.0, ZERO).rates]
@@ -197,11 +197,11 @@ def test_projection_closes_and_is_nearest():
     omega = list(rng.uniform(-1.0, 1.0, 8))
     to = Motion(Vec2(*reach(0.1)), Vec2(0.3, -0.2))
     off = [a + 1e-3 * x for a, x in zip(theta, rng.uniform(-1.0, 1.0, 8), strict=True)]
-    result, speeds = close(MATH, rods, off, omega, to)
+    result, speeds, _ = close(MATH, rods, off, omega, to)
     end = end_motion(rods, result, speeds, MATH)
     assert math.hypot(end.p.x - to.p.x, end.p.y - to.p.y) < 1e-12
     assert math.hypot(end.p1.x - to.p1.x, end.p1.y - to.p1.y) < 1e-12
-    again, _ = close(MATH, rods, result, speeds, to)
+    again, _, _ = close(MATH, rods, result, speeds, to)
     np.testing.assert_allclose(again, result, atol=1e-13)
 
 

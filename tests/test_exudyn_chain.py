@@ -87,7 +87,7 @@ class Case:
         state = list(solution(self, np.array([0.0, case.begin]))[:, -1])
         psi, speed, _ = self.rocker(case.begin)
         end = Motion(Vec2(*reach(psi)), Vec2(math.cos(psi), math.sin(psi)) * (M["e"] * speed))
-        case.theta, case.omega = close(MATH, self.rods, state[:N], state[N:], end)
+        case.theta, case.omega, _ = close(MATH, self.rods, state[:N], state[N:], end)
         return case
 
     def times(self, steps):

@@ -286,17 +286,9 @@ def end_motion(rods: Rods, theta: Sequence[Any], omega: Sequence[Any], xp: Any) 
 
 def close(
     xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int = 3
-) -> tuple[list[Any], list[Any]]:
-    """Angles and speeds with which the chain ends at `end` and moves with it: the nearest ones to the given ones, in
-    the metric of the masses."""
-    angles, speeds, _ = close_with_jolt(xp, rods, theta, omega, end, rounds)
-    return angles, speeds
-
-
-def close_with_jolt(
-    xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int
 ) -> tuple[list[Any], list[Any], Any]:
-    """The result of `close`, and the work [J] of the jolts at A2 that change the speeds."""
+    """Angles and speeds with which the chain ends at `end` and moves with it: the nearest ones to the given ones, in
+    the metric of the masses; and the work [J] of the jolts at A2 that change the speeds."""
     N, work = len(rods), 0.0
     nothing = [Vec2(0.0, 0.0)] * N, [0.0] * N, [0.0] * N
     for _ in range(rounds):

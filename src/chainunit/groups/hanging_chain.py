@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
-from .chain import Chain, Rods, close_with_jolt, pins
+from .chain import Chain, Rods, close, pins
 from .loads import Effect, Moving, Resistance, wrench_at
 
 State = tuple[Sequence[Any], Sequence[Any]]
@@ -58,27 +58,13 @@ class HangingChain(NamedTuple):
         """Angles and speeds with which the chain ends at its outer pin and moves with it, by the smallest change in
         the metric of the masses, and the work of the jolt [J]."""
         a1, a2 = m.pins[self.start].p, m.pins[self.end]
-        return close_with_jolt(xp, self.rods, *self.state, Motion(a2.p - a1, a2.p1 * w), 1)
+        return close(xp, self.rods, *self.state, Motion(a2.p - a1, a2.p1 * w), 1)
 
 
 class HeldChain:
     """A chain at one state, held at its outer pin, whose motion is known: the `chain`, the `gap` from its end to that
     pin, the `end_acceleration` of that pin at constant speed of the coordinate, and the force at the start of each
     rod."""
-
-    __slots__ = (
-        "_speed_gap",
-        "a1",
-        "a2",
-        "at_start",
-        "chain",
-        "data",
-        "end_acceleration",
-        "gap",
-        "resistance_power",
-        "turn",
-        "w",
-    )
 
     def __init__(self, xp: Any, data: HangingChain, a1: Vec2, a2: Motion, turn: Any, w: Any) -> None:
         """

@@ -32,19 +32,6 @@ class Mechanism:
     `pins` with points, and `bodies` by name; `turns` the relative rotation in each revolute joint by q, `slides` the
     motion in each sliding one."""
 
-    __slots__ = (
-        "_groups",
-        "bodies",
-        "derived",
-        "linkage",
-        "links",
-        "pins",
-        "q",
-        "slides",
-        "topology",
-        "turns",
-    )
-
     def __init__(
         self, xp: Any, linkage: Linkage, q: Any, derived: Sequence[Any] = (), topology: Topology | None = None
     ) -> None:

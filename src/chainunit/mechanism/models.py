@@ -357,10 +357,13 @@ class DirectMachine(LinkageModel):
             requirements=self._limits,
             parts=(Part(self.Outputs, self._outputs),),
             sketch=inverse.sketch,
-            initial_states=_initial_states,
+            initial_states=lambda xp, p: RotatingStates(phi=p.phi_start, w=p.w_start),
             controlled=True,
-            internal_step=_internal_step,
-            tolerance=_tolerance,
+            # 5 ms, so that no step skips the start of a cut or the contact with a stop
+            internal_step=lambda xp, p: 5e-3,
+            # tight: the motion is slow, but smoothed friction near rest and a blade that a stack stops act within
+            # microseconds; and a free motion does not reduce its errors, so that local errors must be small
+            tolerance=lambda xp, p: 1e-9,
             constrained_states=lambda xp, p, u, x: [x.phi, x.w],
             shared=self._at_shaft,
             derivatives=self._rates,
@@ -411,22 +414,6 @@ class DirectMachine(LinkageModel):
             fields["potential_energy"] += stops.energy
             fields["dissipated_power"] += stops.lost * s.w
         return self.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
-
-
-def _initial_states(xp: Any, p: Any) -> Any:
-    """The start angle and speed."""
-    return RotatingStates(phi=p.phi_start, w=p.w_start)
-
-
-def _internal_step(xp: Any, p: Any) -> Any:
-    """Longest internal step: 5 ms, so that no step skips the start of a cut or the contact with a stop."""
-    return 5e-3
-
-
-def _tolerance(xp: Any, p: Any) -> Any:
-    """Tight relative tolerance. The motion is slow, but smoothed friction near rest and a blade that a stack stops
-    act within microseconds; and a free motion does not reduce its errors, so that local errors must be small."""
-    return 1e-9
 
 
 def acceleration(p: Any, u: Any, s: MachineState, stop: Any = 0.0) -> Any:

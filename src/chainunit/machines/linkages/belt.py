@@ -12,20 +12,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...core.errors import InputError, shown
+from ...core.errors import InputError
 from ...core.planar import Vec2
 from ...groups.body import Load
 from ...groups.group import Outline
 from ...groups.joints import LinkageInMotion, Rail, Third
+from .entries import EntryReader, is_given
 from .gear import GearedLink, GearKind, Mesh, MeshData
 from .joint_kind import BELT, JointEntry, JointParts, JointTable
-
-if TYPE_CHECKING:
-    from .entries import EntryReader
 
 _EVEN = 1e-9
 """Share of a ratio of diameters within which it is the fraction of two small whole numbers."""
@@ -128,20 +126,16 @@ class BeltKind(GearKind):
     def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the pitch diameters of both pulleys [m], and whether the belt is crossed."""
         diameters: Any = table.get("diameters")
-        crossed = table.get("crossed", False)
         numbers = list[float]()
         with reader.at(f"{key}.diameters"):
             if isinstance(diameters, list) and len(diameters) == 2:
                 numbers = [reader.number(f"{key}.diameters", x, "m") for x in diameters]
             if not numbers or min(numbers) <= 0.0:
                 raise InputError(
-                    f"is {'missing' if diameters is None else shown(diameters)}; must be two lengths > 0, the "
-                    f"pitch diameters of {joint['on'][0]} and of {joint['by'][0]}, such as "
-                    '["80 mm", "160 mm"]'
+                    f"{is_given(diameters)}; must be two lengths > 0, the pitch diameters of {joint['on'][0]} and of "
+                    f'{joint["by"][0]}, such as ["80 mm", "160 mm"]'
                 )
-        if not isinstance(crossed, bool):
-            reader.fault(f"{key}.crossed", f"is {shown(crossed)}; must be true or false")
-        joint |= {"diameters": numbers, "crossed": crossed}
+        joint |= {"diameters": numbers, "crossed": reader.flag(f"{key}.crossed", table)}
 
     def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add the arm with its points at the centres."""

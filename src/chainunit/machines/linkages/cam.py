@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +16,8 @@ from ...groups.group import Group
 from ...groups.joints import Rail
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup
 from ...mechanism.expressions import LawCourse, value_of
+from .entries import EntryReader
 from .joint_kind import CAM, JointEntry, JointParts, JointTable, SingleLinkKind
-
-if TYPE_CHECKING:
-    from .entries import EntryReader
 
 _ANGLES = np.linspace(0.0, 2.0 * math.pi, 28801)
 """Angles at which a profile is checked."""
@@ -45,13 +43,9 @@ class CamKind(SingleLinkKind):
         """Add the radius of the profile, and the roller or the face of the follower."""
         on, point = joint["on"]
         others = [name for name in reader.points[on] if name != point]
-        joint |= {"face": table.get("face", ""), "pitch": table.get("pitch", False)}
         joint["radius"] = reader.law_entry(f"{key}.radius", table.get("radius"), "m", "rad")
-        roller = joint["roller"] = reader.entry(f"{key}.roller", table.get("roller", 0.0), "m")
-        if not isinstance(roller, str) and roller < 0.0:
-            reader.fault(f"{key}.roller", f"is {shown(table['roller'])}; must be >= 0")
-        if not isinstance(joint["pitch"], bool):
-            reader.fault(f"{key}.pitch", f"is {shown(joint['pitch'])}; must be true or false")
+        joint["roller"] = reader.positive(f"{key}.roller", table.get("roller", 0.0), "m")
+        joint |= {"face": table.get("face", ""), "pitch": reader.flag(f"{key}.pitch", table)}
         if on == GROUND:
             reader.fault(
                 f"{key}.on", f"is ground.{point}; must be a point of the follower, in `by` one of the cam"

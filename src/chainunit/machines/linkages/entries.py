@@ -93,11 +93,18 @@ class EntryReader(Entry):
             return default
         return entry
 
-    def positive(self, key: str, entry: Any, unit: str) -> Any:
-        """An entry that may name inputs; a number must be >= 0."""
-        value = self.entry(key, entry, unit, inputs=True)
-        if not isinstance(value, str) and value < 0.0:
-            self.fault(key, f"is {shown(entry)}; must be >= 0")
+    def positive(self, key: str, entry: Any, unit: str, sign: str = ">=", inputs: bool = False) -> Any:
+        """An entry, see `entry`; a number must be >= 0, or > 0 by the `sign`."""
+        value = self.entry(key, entry, unit, inputs=inputs)
+        if not isinstance(value, str) and (value < 0.0 or (value == 0.0 and sign == ">")):
+            self.fault(key, f"is {shown(entry)}; must be {sign} 0")
+        return value
+
+    def flag(self, key: str, table: Mapping[str, Any]) -> Any:
+        """A choice of a table by the last name of its `key`, false if it is not there."""
+        value = table.get(key.rpartition(".")[2], False)
+        if not isinstance(value, bool):
+            self.fault(key, f"is {shown(value)}; must be true or false")
         return value
 
     def tables(self, kind: str, keys: tuple[str, ...] = ()) -> Iterator[tuple[str, str, Mapping[str, Any]]]:

@@ -52,7 +52,6 @@ _LAW_PLACES = 96
 """Places of the first driver at which a law is checked."""
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-"""Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 _FURTHER_KEYS = (*_DRIVER_KEYS, "phi", "by", "start")
 _GEAR, _MOTOR = "gear", "motor"
@@ -320,21 +319,22 @@ class _LinkageReader(LoadReader):
         else:
             for quantity, unit in (("mass", "kg"), ("inertia", "kg.m2")):
                 if quantity in table:
-                    value = link[quantity] = self.positive(f"{key}.{quantity}", table[quantity], unit)
+                    value = link[quantity] = self.positive(
+                        f"{key}.{quantity}", table[quantity], unit, inputs=True
+                    )
                     if not isinstance(value, str):
                         link["own"][quantity], link[quantity] = value, f"{quantity}_of_{name}"
             if "centroid" in table:
                 link["centroid"] = self.vector(f"{key}.centroid", table["centroid"], "m")
         if "stiffness" in table:
-            stiffness = link["stiffness"] = self.entry(f"{key}.stiffness", table["stiffness"], "N/m")
-            if not isinstance(stiffness, str) and stiffness <= 0.0:
-                self.fault(f"{key}.stiffness", f"is {shown(table['stiffness'])}; must be > 0")
+            link["stiffness"] = self.positive(f"{key}.stiffness", table["stiffness"], "N/m", ">")
         masses = self.table(f"{key}.masses", table)
         for point in masses:
             if point not in points:
                 self.fault(f"{key}.masses.{point}", f"is no point of {name}{near_name(point, points)}")
         link["masses"] = {
-            point: self.positive(f"{key}.masses.{point}", mass, "kg") for point, mass in masses.items()
+            point: self.positive(f"{key}.masses.{point}", mass, "kg", inputs=True)
+            for point, mass in masses.items()
         }
         return link
 
@@ -352,11 +352,10 @@ class _LinkageReader(LoadReader):
         if start == end:
             self.fault(f"{key}.bar", f"goes from {start} to {start}; from and to must be two points")
         (ax, ay), (bx, by) = points[str(start)], points[str(end)]
-        sizes = {}
-        for quantity, unit in (("area", "m2"), ("density", "kg/m3")):
-            value = sizes[quantity] = self.entry(f"{key}.bar.{quantity}", bar.get(quantity), unit)
-            if not isinstance(value, str) and value <= 0.0 and quantity in bar:
-                self.fault(f"{key}.bar.{quantity}", f"is {shown(bar[quantity])}; must be > 0")
+        sizes = {
+            quantity: self.positive(f"{key}.bar.{quantity}", bar.get(quantity), unit, ">")
+            for quantity, unit in (("area", "m2"), ("density", "kg/m3"))
+        }
         square = f"((({bx}) - ({ax}))**2 + (({by}) - ({ay}))**2)"
         mass = f"({sizes['area']}) * ({sizes['density']}) * sqrt({square})"
         middle = [f"0.5 * (({a}) + ({b}))" for a, b in ((ax, bx), (ay, by))]

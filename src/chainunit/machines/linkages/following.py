@@ -146,34 +146,44 @@ class FollowedLinkage:
     def _fault_of_shared(self, k: int, plate: SharedPlate, places: Sequence[float]) -> InputError | None:
         """The refusal of the group `k` of the structure, a plate on redundant legs: by its first dead position on the
         way from the start, or one before it, or else by the leg that fits least; None if it has no such fault."""
-        before, signs, worst = self._before(k), list[float](), (0.0, 0.0, 0, plate.start)
-        for way in ([q for q in places if q >= plate.start], [q for q in places[::-1] if q < plate.start]):
-            near, last, last_q = plate.assembly, list[float](), plate.start
-            for q in (plate.start, *way):
+        start, before, signs = plate.start, self._before(k), list[float]()
+        worst = 0.0, 0.0, 0, start
+        for way in ([q for q in places if q >= start], [q for q in places[::-1] if q < start]):
+            near, last = plate.assembly, None
+            for q in (start, *way):
                 try:
                     m = before(q)
                 except (ArithmeticError, ValueError, IndexError):
                     n = self._open_at(q)
                     return None if n is None or n >= k else self._open_group(n, q)
                 signs = signs or signs_of(m.margins())
-                margins, fit = signed(m.margins(), signs), None
+                # a plate that does not close is dead
+                margins, fit = [*signed(m.margins(), signs), 0.0], (0.0, 0.0, 0)
                 with suppress(ArithmeticError, ValueError):
                     placed = plate.at_position(m)
                     near = corrected(partial(plate.legs_at, MATH, placed), near, 2 * STEPS)
                     group = plate.solved(MATH, placed, near)
-                    margins, fit = [*margins, group.hold], group.least_fit()
-                margins += [0.0] * (fit is None)
-                for n, (margin, before_it) in enumerate(zip(margins, last or margins, strict=True)):
-                    # it falls evenly to a dead position, at the next place or before it
-                    if not min(margin, 2.0 * margin - before_it) > LEAST_MARGIN:
-                        ahead = (q - last_q) * margin / (before_it - margin) if last else 0.0
-                        return dead_group(self.structure.groups[n], self.way.words(q + ahead), 0.0)
-                last, last_q = margins, q
-                worst = max(worst, (*(fit or (0.0, 0.0, 0)), q))
+                    margins[-1], fit = group.hold, group.least_fit()
+                here = q, margins
+                if fault := self._dead_ahead(last or here, here):
+                    return fault
+                last, worst = here, max(worst, (*fit, q))
         part, gap, leg, q = worst
         if not part > MOST_MISFIT:
             return None
         return misfit_of_leg(self.structure.groups[k], leg, gap, self.way.words(q))
+
+    def _dead_ahead(
+        self, last: tuple[float, list[float]], here: tuple[float, list[float]]
+    ) -> InputError | None:
+        """The refusal of the first group whose margin, which falls evenly from the `last` place, is none `here` or at
+        the place after; each place has its margins."""
+        (last_q, before), (q, margins) = last, here
+        for group, margin, more in zip(self.structure.groups, margins, before, strict=False):
+            if not min(margin, 2.0 * margin - more) > LEAST_MARGIN:
+                ahead = (q - last_q) * margin / (more - margin) if q != last_q else 0.0
+                return dead_group(group, self.way.words(q + ahead), 0.0)
+        return None
 
     def _check_followed(self) -> None:
         """Refuse groups on legs that cannot be followed all the way."""

@@ -102,14 +102,10 @@ class FurtherDrivers:
     def feed(self) -> list[tuple[str, Any, Any]]:
         """The fields of the inputs in normal running, in which such a driver stands."""
         return [
-            self._field(self.named(name), placed, placed())
-            for name, declared, _ in self.inputs()
+            self._field(entry, placed, placed())
+            for entry, (_, declared, _) in zip(self.free.values(), self.inputs(), strict=True)
             for placed in [declared_class("Place", (), fields_of(declared, without=("w", "a")))]
         ]
-
-    def named(self, variable_name: str) -> DriverEntry:
-        """The driver with this name of its variables."""
-        return next(entry for entry in self.entries if self.names[entry.name] == variable_name)
 
     def _field(self, entry: DriverEntry, declared: Any, default: Any = None) -> tuple[str, Any, Any]:
         return self.names[entry.name], declared, group(declared, f"driver {entry.name}", default=default)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -34,11 +34,9 @@ from ...groups.joints import (
     Third,
 )  # fmt: skip
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup
+from .entries import EntryReader, is_given
 from .joint_kind import JointEntry, JointParts, JointTable, SingleLinkKind
 from .names import connected, owners_of
-
-if TYPE_CHECKING:
-    from .entries import EntryReader
 
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
 _MOST = 20
@@ -224,18 +222,15 @@ class GearKind(SingleLinkKind):
     def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add to the `joint` the teeth of both wheels, and whether one is a ring (internal)."""
         teeth: Any = table.get("teeth")
-        internal = table.get("internal", False)
         whole = isinstance(teeth, list) and len(teeth) == 2 and all(type(z) is int and z > 0 for z in teeth)
         if not whole:
-            state = "is missing" if teeth is None else f"is {shown(teeth)}"
             reader.fault(
                 f"{key}.teeth",
-                f"{state}; must be two whole numbers > 0, the teeth of {joint['on'][0]} and of {joint['by'][0]}, "
-                "such as [20, 40]",
+                f"{is_given(teeth)}; must be two whole numbers > 0, the teeth of {joint['on'][0]} and of "
+                f"{joint['by'][0]}, such as [20, 40]",
             )
-        if not isinstance(internal, bool):
-            reader.fault(f"{key}.internal", f"is {shown(internal)}; must be true or false")
-        elif whole and internal and teeth[0] == teeth[1]:
+        internal = reader.flag(f"{key}.internal", table)
+        if whole and internal is True and teeth[0] == teeth[1]:
             reader.fault(
                 f"{key}.teeth",
                 f"is {shown(teeth)}; a wheel in a ring has fewer teeth than the ring; give both numbers",

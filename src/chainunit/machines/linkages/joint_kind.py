@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
-from ...core.errors import shown
 from ...core.planar import Vec2
 from ...groups.body import Bar
 from ...groups.group import Group
 from ...groups.joints import Rail
 from ...mechanism.assur import PRISMATIC, REVOLUTE, AssurGroup
-
-if TYPE_CHECKING:
-    from .entries import EntryReader
+from .entries import EntryReader, is_given
 
 BELT = "belt"
 CAM = "cam"
@@ -145,10 +142,9 @@ class GuideKind(JointKind):
             toward = toward.rpartition(".")[2]
         others = [name for name in reader.points[by] if name != start]
         if toward not in others:
-            state = "is missing" if toward is None else f"is {shown(toward)}"
             reader.fault(
                 f"{key}.toward",
-                f"{state}; must be another point of {by}, to which the line goes: "
+                f"{is_given(toward)}; must be another point of {by}, to which the line goes: "
                 f"{', '.join(others) or 'add one'}",
             )
         joint["toward"] = toward

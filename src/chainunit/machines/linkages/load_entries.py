@@ -106,9 +106,7 @@ class LoadReader(ParameterReader):
             )
         if len(places) > MOST_POINTS:
             raise InputError(f"has {len(places)} points; {FEWER}")
-        if over == "x":
-            return self.like(places), self.like(values)
-        unit = self.unit_of_place()
+        unit = self.unit_of_place() if over == "phi" else None
         if unit is None:
             return self.like(places), self.like(values)
         return ([self.number(key, x, unit) for x in places], unit), self.like(values)
@@ -216,7 +214,8 @@ class LoadReader(ParameterReader):
                 "that pulls at every length",
             )
         for quantity, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
-            load[quantity] = self.positive(f"{key}.{quantity}", table.get(quantity, 0.0), unit)
+            entry = table.get(quantity, 0.0)
+            load[quantity] = self.positive(f"{key}.{quantity}", entry, unit, inputs=True)
 
     def end(self, entry: Any) -> list[str]:
         """A point of a link, as "link.point" or a list of two."""

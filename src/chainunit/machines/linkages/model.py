@@ -251,21 +251,15 @@ class LinkageDescription(LinkageOutputs):
 
     # the linkage
 
-    def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
-        """The linkage with the values of parameters and inputs."""
-        return self._loaded(self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u), p)
+    def linkage(self, xp: Any, p: Any, u: Any, places: Mapping[str, Any] | None = None) -> DescribedLinkage:
+        """The linkage with the values of parameters and inputs; `places` as of `_parts`."""
+        geometry = LinkGeometry(xp, self.structure, self.values(xp, p, u))
+        return self._loaded(self._parts(geometry, u, places), p)
 
     def _parts(self, geometry: LinkGeometry, u: Any, places: Mapping[str, Any] | None = None) -> LinkageParts:
         """The parts with the drivers that are inputs at the places that `u` gives, or at `places` by name."""
         courses = self.further.courses(geometry.values, u, places) if self.further.entries else {}
         return LinkageParts(geometry, self.sides, courses)
-
-    def _standing(self, xp: Any, p: Any, places: Mapping[str, Any]) -> DescribedLinkage:
-        """The linkage with the drivers that are inputs at these places."""
-        u = self.Inputs()
-        return self._loaded(
-            self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u, places), p
-        )
 
     def _loaded(self, parts: LinkageParts, p: Any) -> DescribedLinkage:
         """The linkage of these parts, with the loads on it."""
@@ -427,7 +421,7 @@ class LinkageDescription(LinkageOutputs):
                 return sum(abs(place - other[name]) for name, place in places.items())
 
             _, near = min(visited, key=lambda visit: way(visit[0]))
-            other = self._followed(self._standing(MATH, p, places))
+            other = self._followed(self.linkage(MATH, p, self.Inputs(), places))
             other.signs, other.derived = followed.signs, followed.derived
             try:
                 visited.append((places, other.courses({name: course[0] for name, course in near.items()})))
@@ -578,7 +572,7 @@ class LinkageDescription(LinkageOutputs):
             course = []
             for k, q in enumerate(self.way.places()):
                 if self.further.free:
-                    linkage = self._standing(xp, p, self.further.lattice(k))
+                    linkage = self.linkage(xp, p, self.Inputs(), self.further.lattice(k))
                 course.append(signed(self._margins(xp, linkage, derived, q), self.followed.signs))
         for margins_of_group in zip(*course, strict=True):
             yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf

@@ -152,7 +152,7 @@ class LinkageParts:
         p, c, q, drive = (self.structure.joints[joint.name] for joint in group.joints)
         near, far, lever = group.links
         if group.kind == CYLINDER:
-            return self._cylinder(near, far, lever, p, c, q, drive)
+            return self._cylinder(group.links, p, c, q, drive)
         inner, joint = self._inner(c, far, lever), self._inner(drive, far, near)
         bar, swung = self._rod(near, p, drive), self._rod(lever, q, c)
         frame, length = self.geometry.span(far, drive.at(far), c.at(far))
@@ -162,16 +162,10 @@ class LinkageParts:
         return Elbow(bar, joint, arm, inner, swung, *turn, self.sides[near], course)
 
     def _cylinder(
-        self,
-        barrel: str,
-        rod: str,
-        lever: str,
-        p: JointEntry,
-        c: JointEntry,
-        q: JointEntry,
-        slide: JointEntry,
+        self, links: Sequence[str], p: JointEntry, c: JointEntry, q: JointEntry, slide: JointEntry
     ) -> Driver:
         """A cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
+        barrel, rod, lever = links
         geometry, inner = self.geometry, self._inner(c, rod, lever)
         # from the barrel to the rod
         in_barrel, in_rod = (
@@ -277,16 +271,13 @@ class LinkageParts:
         plate = self.bar(ternary, OWN)
         built = [self._leg(*ends, ternary) for ends in zip(legs, outer, inner, strict=True)]
         first, second, third = built
-        return Triad(
-            ternary,
-            plate.mass or Mass(0.0, 0.0, 0.0, 0.0),
-            (first, second, third),
-            plate.points,
-            Pose(*self.structure.poses[ternary]),
-            self.structure.start,
-            self.sides.get(ternary, USUAL),
-            self.structure.span,
-        )
+        mass, pose = plate.mass or Mass(0.0, 0.0, 0.0, 0.0), Pose(*self.structure.poses[ternary])
+        return Triad(ternary, mass, (first, second, third), plate.points, pose, **self._course_of(ternary))
+
+    def _course_of(self, name: str) -> dict[str, Any]:
+        """How a group that is followed is tracked, and over which way."""
+        tracking = self.sides.get(name, USUAL)
+        return {"start": self.structure.start, "tracking": tracking, "span": self.structure.span}
 
     def _shared(self, name: str, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
         """A plate on legs that share its force, and the joint that holds it besides, if one does."""
@@ -300,19 +291,14 @@ class LinkageParts:
         bar = held.bar if held else self.bar(name, OWN)
         legs = [self._leg(*ends, name) for ends in zip(links, outer, inner, strict=True)]
         stiffness = [self.geometry.number(self.structure.links[link].stiffness) for link in links]
-        tracking = self.sides.get(name, USUAL)
-        return SharedPlate(
-            name, held, bar, legs, stiffness, x, self.structure.start, tracking, self.structure.span
-        )
+        return SharedPlate(name, held, bar, legs, stiffness, x, **self._course_of(name))
 
     def _tetrad(self, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
         """Two links, each on its outer joint, with two legs between them; they carry the pins of the legs."""
-        start = self.structure.start
         first, x1 = self._plate(links[0], joints[0], joints[2:4])
         second, x2 = self._plate(links[1], joints[1], joints[4:])
         one, other = (self._leg(links[k], joints[k], joints[k + 2], links[1]) for k in (2, 3))
-        tracking = self.sides.get(links[0], USUAL)
-        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, tracking, self.structure.span)
+        return Tetrad(links[0], (first, second), (one, other), (x1, x2), **self._course_of(links[0]))
 
     def _plate(self, link: str, outer: JointEntry, inner: Sequence[JointEntry]) -> tuple[Plate, Any]:
         """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ...core.errors import InputError
@@ -24,11 +24,11 @@ class LinkEntry:
 
     name: str
     points: Mapping[str, Sequence[Entry]]
-    mass: Entry
-    inertia: Entry
-    centroid: Sequence[Entry]
-    masses: Mapping[str, Entry]
-    stiffness: Entry
+    mass: Entry = 0.0
+    inertia: Entry = 0.0
+    centroid: Sequence[Entry] = field(default_factory=lambda: [0.0, 0.0])
+    masses: Mapping[str, Entry] = field(default_factory=dict)
+    stiffness: Entry = 0.0
 
     @property
     def heavy(self) -> bool:
@@ -138,15 +138,7 @@ class Structure:
             if the linkage is not determined, or has a group that is not covered.
         """
         links = {
-            link["name"]: LinkEntry(
-                link["name"],
-                link["points"],
-                link.get("mass", 0.0),
-                link.get("inertia", 0.0),
-                link.get("centroid", [0.0, 0.0]),
-                link.get("masses", {}),
-                link.get("stiffness", 0.0),
-            )
+            link["name"]: LinkEntry(**{key: entry for key, entry in link.items() if key != "own"})
             for link in data["links"]
         }
         joints = {joint["name"]: JointEntry.from_table(joint) for joint in data["joints"]}
