@@ -296,6 +296,21 @@ def quantity(
     return dataclasses.field(default=default, metadata=metadata)
 
 
+def percentage(description: str, **limits: Any) -> Any:
+    """A field that declares a share, shown in per cent, as `quantity` does."""
+    return quantity("1", description, kind="percent", **limits)
+
+
+def whole_number(description: str, **limits: Any) -> Any:
+    """A field that declares a whole number, as `quantity` does."""
+    return quantity("1", description, type="Integer", **limits)
+
+
+def plain_variable(name: str, unit: str, description: str, **bounds: Any) -> Variable:
+    """The variable of a number that no declaration has; `bounds` are further fields of `Quantity`."""
+    return Variable(name, description, Quantity(unit, description, **bounds))
+
+
 def group(declared: type, description: str, *, default: Any = None) -> Any:
     """A field that holds the quantities of the declaration `declared`, under this field's name.
 
@@ -307,7 +322,9 @@ def group(declared: type, description: str, *, default: Any = None) -> Any:
     return dataclasses.field(default=default, metadata=metadata)
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(quantity, group))
+@dataclass_transform(
+    frozen_default=True, kw_only_default=True, field_specifiers=(quantity, percentage, whole_number, group)
+)
 def declaration(cls: type[T]) -> type[T]:
     """Make `cls` a declaration: a frozen dataclass with keyword-only fields."""
     # no slots: declarations may inherit from several others

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
 from ..core.brief import briefly_shown
 from ..core.descriptions import USUAL_DRIVER, of_driver
-from ..core.quantities import group, quantity
+from ..core.quantities import group, percentage, quantity, whole_number
 from .text import array_entry, entry
 
 T = TypeVar("T")
@@ -91,7 +91,7 @@ def part(
     return dataclasses.field(default=default, metadata={"part": declared_part})
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(quantity, group, part))
+@dataclass_transform(frozen_default=True, field_specifiers=(quantity, percentage, whole_number, group, part))
 def result(cls: Any = None, *, frozen: bool = True) -> Any:
     """Make `cls` a result: a dataclass with declared parts."""
     if cls is None:

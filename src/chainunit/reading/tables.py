@@ -217,6 +217,12 @@ def number(variable: Variable) -> Any:
     return Annotated[float, check], Field(None, description=variable.description)
 
 
+def file_key(kind: Any, usual: Any, description: str, **limits: Any) -> Any:
+    """A key of a table that is no quantity, as a pydantic field: its type, its value where a file leaves it out, and
+    its meaning."""
+    return kind, Field(usual, description=description, **limits)
+
+
 def schema(declared: type, title: str, prefix: str, **more: Any) -> type[BaseModel]:
     """The pydantic model of a declaration. It has the fields of the declaration and the fields `more`; none
     is required, and unknown keys are refused."""

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
 from ..core.errors import InputError, near_name
 from ..core.quantities import Value, declaration, quantity
 from ..drives.motor import Motor
 from ..reading.lists import Entry, leaves
-from ..reading.tables import instance
+from ..reading.tables import file_key, instance
 from ..study.conditions import given
 from ..study.file_section import filled_text
 from ..study.organs import finer_models
@@ -36,9 +34,8 @@ class RecordingTable:
 
 
 FILE: Any = filled_text("recording (CSV, or CSV.gz), relative to the study file")
-COLUMNS: Any = (
-    dict[str, Any],
-    Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
+COLUMNS: Any = file_key(
+    dict[str, Any], {}, "by quantity, the head of its column, where that is not the quantity's name"
 )
 FROM_RECORDING: Mapping[str, str] = {
     "crank_speed": "run.crank_speed",

@@ -31,6 +31,8 @@ class Contents:
     """name of its analysis, if the section has another name"""
     before: str = ""
     """section of the base before which it stands; empty for one behind the turn at constant speed"""
+    on_sheet: bool = False
+    """whether it belongs on the sheet of a study, not in the annex alone"""
 
 
 @dataclass(frozen=True)
@@ -102,10 +104,6 @@ class Capability(StudyCapability):
     def answer(self, study: StudyRecord) -> AnswerBlocks:
         """Its part of the answer of a study."""
         return AnswerBlocks()
-
-    def on_sheet(self) -> tuple[str, ...]:
-        """Names of its sections that belong on the sheet of a study, not in the annex alone."""
-        return ()
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """What the study could have checked by this capability and did not."""

@@ -17,22 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..reading.text import Units
-from .figure import (
-    Axis,
-    Bars,
-    Between,
-    Curve,
-    Field,
-    Figure,
-    Hatch,
-    Item,
-    Label,
-    Mark,
-    Panel,
-    Shade,
-    hatch_lines,
-    in_units,
-)
+from . import figure as fig
 from .style import BARS, FILLS, HATCHES, INK, class_colours, look_of
 
 _AXIS = {
@@ -87,26 +72,26 @@ _PHONE = 340
 """Width for which the rows of a legend are counted where panels stand below each other [px]."""
 
 
-def height(figure: Figure) -> int:
+def height(figure: fig.Figure) -> int:
     """Height on the page [px]."""
     return round(_ENDS + _above(figure) + _legend_rows(figure) + _row(figure) * sum(figure.row_heights))
 
 
-def _row(figure: Figure) -> int:
+def _row(figure: fig.Figure) -> int:
     """Usual height of a row of panels [px]."""
     return _HALF_ROW if figure.half else _ROW
 
 
-def _gap(figure: Figure, joined: bool) -> float:
+def _gap(figure: fig.Figure, joined: bool) -> float:
     """Room between two panels of a column [px], which is small if they are `joined` by one axis."""
     return (22.0 if joined else 66.0) + (22.0 if figure.has_titles else 0.0)
 
 
-def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
+def page_figure(spec: fig.Figure, units: Units) -> dict[str, Any]:
     """The figure for the script of the page: traces and layout of plotly and, where panels stand beside each other,
     the changes of the layout for a `narrow` box and back to a `wide` one, and the width `below` which a box is
     narrow [px]. On paper a `tall` figure keeps its height, as its rows have names."""
-    drawing = _Drawing(in_units(spec, units))
+    drawing = _Drawing(fig.in_units(spec, units))
     for place in drawing.spec.all_panels():
         drawing.panel(*place)
     by_point = any(_hovers_by_point(panel) for _, _, panel in spec.all_panels())
@@ -128,22 +113,22 @@ def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
     return shown | {"narrow": narrow, "wide": wide, "below": max(_LEAST, _COLUMN * len(spec.panels[0]))}
 
 
-def _hovers_by_point(panel: Panel) -> bool:
+def _hovers_by_point(panel: fig.Panel) -> bool:
     """Whether the cursor shows single points of a panel: its x is not a variable that runs from left to right."""
-    curves = (item for item in panel.items if isinstance(item, Curve) and item.has_line)
-    bars = any(isinstance(item, Bars | Field | Hatch) for item in panel.items)
+    curves = (item for item in panel.items if isinstance(item, fig.Curve) and item.has_line)
+    bars = any(isinstance(item, fig.Bars | fig.Field | fig.Hatch) for item in panel.items)
     return panel.equal or bars or any(bool(np.any(np.diff(curve.x) < 0.0)) for curve in curves)
 
 
-def _above(figure: Figure) -> int:
+def _above(figure: fig.Figure) -> int:
     """Room for words above the panels [px]."""
     panels = [panel for _, _, panel in figure.all_panels()]
-    marks = [item for panel in panels for item in panel.items if isinstance(item, Mark) and item.words]
+    marks = [item for panel in panels for item in panel.items if isinstance(item, fig.Mark) and item.words]
     room = 82 if any(mark.upright for mark in marks) else 18 if marks else 0
     return room + (18 if figure.has_titles else 0)
 
 
-def _legend_rows(figure: Figure, width: float = 0.0) -> int:
+def _legend_rows(figure: fig.Figure, width: float = 0.0) -> int:
     """Room for the second and further rows of the legend [px]; with a `width` [px], as many names stand in a row as
     it takes, else four."""
     items = (item for _, _, panel in figure.all_panels() for item in panel.items)
@@ -170,7 +155,7 @@ def _domains(sizes: Iterable[float], gap: float) -> list[tuple[float, float]]:
 class _Drawing:
     """Traces, shapes and words of the panels that are drawn; the values of `spec` are in the units that are shown."""
 
-    def __init__(self, spec: Figure) -> None:
+    def __init__(self, spec: fig.Figure) -> None:
         self.spec = spec
         self.traces: list[dict[str, Any]] = []
         self.shapes: list[dict[str, Any]] = []
@@ -217,7 +202,7 @@ class _Drawing:
             begin += size + gap
         return changes
 
-    def panel(self, row: int, column: int, panel: Panel) -> None:
+    def panel(self, row: int, column: int, panel: fig.Panel) -> None:
         """Draw a panel into its place, with a y axis of its own and an x axis that the panels below it may share.
         Plotly names axes x, x2, .. and y, y2, .."""
         beside = [y for (other_row, _), (_, y) in self.places.items() if other_row == row]
@@ -257,13 +242,13 @@ class _Drawing:
         self.legend_names |= {name} if new else set()
         return {"name": name or " ", "legendgroup": name, "showlegend": new}
 
-    def _draw(self, item: Item, panel: Panel, x: str, y: str) -> None:
+    def _draw(self, item: fig.Item, panel: fig.Panel, x: str, y: str) -> None:
         """Draw an item of a panel with the axes `x` and `y`."""
         place = {"xaxis": x, "yaxis": y}
         match item:
-            case Curve():
+            case fig.Curve():
                 self._curve(item, panel, place)
-            case Between():
+            case fig.Between():
                 line = {"color": INK, "width": 0.8, "dash": "dot"}
                 for values, name, fill in ((item.low, "", None), (item.high, item.name, "tonexty")):
                     self._trace(
@@ -271,27 +256,27 @@ class _Drawing:
                         x=_small(item.x), y=_small(values), mode="lines", line=line, fill=fill,
                         fillcolor=FILLS[item.look], hovertemplate=_hover(panel.y), **self._legend(name), **place,
                     )  # fmt: skip
-            case Shade():
+            case fig.Shade():
                 colour = FILLS[item.look]
                 edge = {"line": {"width": 0}, "layer": "below"}
                 area = {"type": "rect", "fillcolor": colour, "opacity": 0.6, **edge}
                 self.shapes.append(area | _across(item.axis, item.low, item.high, x, y))
                 self._sample(item.name, place, mode="markers", marker=_square(colour))
-            case Mark():
+            case fig.Mark():
                 self._mark(item, place)
-            case Bars():
+            case fig.Bars():
                 self._bars(item, panel, place)
-            case Label():
+            case fig.Label():
                 at_x = float(np.log10(item.x)) if panel.x.log else float(item.x)
                 at_y = float(np.log10(item.y)) if panel.y.log else float(item.y)
                 white = {"bgcolor": "rgba(255, 255, 255, 0.8)"}
                 self._words(x, y, at_x, at_y, item.words, **white, **_PLACES[item.place])
-            case Field():
+            case fig.Field():
                 self._field(item, place)
-            case Hatch():
+            case fig.Hatch():
                 self._hatch(item, place)
 
-    def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
+    def _curve(self, curve: fig.Curve, panel: fig.Panel, place: dict[str, Any]) -> None:
         """Draw a curve; long ones are thinned."""
         samples = self.samples[id(curve.x)] if curve.has_line and not curve.marker else slice(None)
         look = look_of(curve.look)
@@ -317,7 +302,7 @@ class _Drawing:
         if legend["showlegend"]:
             self._trace("scatter", x=[None], y=[None], **style, **legend, **place)
 
-    def _mark(self, mark: Mark, place: dict[str, Any]) -> None:
+    def _mark(self, mark: fig.Mark, place: dict[str, Any]) -> None:
         """Draw a line across a panel, with its words."""
         x, y = place["xaxis"], place["yaxis"]
         look = look_of(mark.look)
@@ -328,7 +313,7 @@ class _Drawing:
             self._words(x, f"{y} domain", mark.at, 1.0, mark.words, **orientation)
         self._sample(mark.name, place, mode="lines", line=style)
 
-    def _bars(self, bars: Bars, panel: Panel, place: dict[str, Any]) -> None:
+    def _bars(self, bars: fig.Bars, panel: fig.Panel, place: dict[str, Any]) -> None:
         """Draw horizontal bars."""
         look = BARS[bars.look % len(BARS)]
         pattern = {"shape": look["pattern"], "fgcolor": "#666666", "size": 6} if not bars.slim else {}
@@ -342,7 +327,7 @@ class _Drawing:
             **self._legend(bars.name), **place,
         )  # fmt: skip
 
-    def _field(self, field: Field, place: dict[str, Any]) -> None:
+    def _field(self, field: fig.Field, place: dict[str, Any]) -> None:
         """Draw a map of classes, with a line around the bold level."""
         count, z = len(field.names), _small(classes(field))
         shades = [[i / max(1, count - 1), colour] for i, colour in enumerate(class_colours(count))]
@@ -357,14 +342,14 @@ class _Drawing:
         for name, colour in zip(field.names, class_colours(count), strict=True):
             self._sample(name, place, mode="markers", marker=_square(colour))
 
-    def _hatch(self, hatch: Hatch, place: dict[str, Any]) -> None:
-        x, y = hatch_lines(hatch)
+    def _hatch(self, hatch: fig.Hatch, place: dict[str, Any]) -> None:
+        x, y = fig.hatch_lines(hatch)
         line = {"color": HATCHES[hatch.look % len(HATCHES)], "width": 1.0}
         curve = {"x": _small(x), "y": _small(y), "mode": "lines", "line": line, "hoverinfo": "skip"}
         self._trace("scatter", **curve, **self._legend(hatch.name), **place)
 
 
-def _axis(axis: Axis) -> dict[str, Any]:
+def _axis(axis: fig.Axis) -> dict[str, Any]:
     """Range and ticks of an axis."""
     if axis.names:
         ticks = {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "ticks": ""}
@@ -393,11 +378,11 @@ def _square(colour: str) -> dict[str, Any]:
     return {"symbol": "square", "size": 12, "color": colour, "line": {"width": 0.8, "color": INK}}
 
 
-def _hover(axis: Axis) -> str:
+def _hover(axis: fig.Axis) -> str:
     return f"%{{y:.4g}} {axis.unit}"
 
 
-def classes(field: Field) -> Any:
+def classes(field: fig.Field) -> Any:
     """The values of a map on a scale on which its levels are 0, 1, 2, .."""
     place = np.interp(field.z, field.levels, np.arange(len(field.levels), dtype=float))
     return np.where(np.isfinite(field.z), place, np.nan)
@@ -414,12 +399,12 @@ def _dash(style: Any) -> str:
     return " ".join(f"{2 * length}px" for length in style[1])
 
 
-def _thin_groups(figure: Figure) -> dict[int, Any]:
+def _thin_groups(figure: fig.Figure) -> dict[int, Any]:
     """The samples to draw of the curves over one x; the key is the identity of x."""
-    groups: dict[int, list[Curve]] = {}
+    groups: dict[int, list[fig.Curve]] = {}
     for _, _, panel in figure.all_panels():
         for item in panel.items:
-            if isinstance(item, Curve) and item.has_line and not item.marker:
+            if isinstance(item, fig.Curve) and item.has_line and not item.marker:
                 groups.setdefault(id(item.x), []).append(item)
     return {key: thin(curves[0].x, *(curve.y for curve in curves)) for key, curves in groups.items()}
 

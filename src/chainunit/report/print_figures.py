@@ -11,22 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..reading.text import Units
-from .figure import (
-    Axis,
-    Bars,
-    Between,
-    Curve,
-    Field,
-    Figure,
-    Hatch,
-    Item,
-    Label,
-    Mark,
-    Panel,
-    Shade,
-    hatch_lines,
-    in_units,
-)
+from . import figure as fig
 from .lines import capital
 from .page_figures import classes
 from .style import BARS, FILLS, HATCHES, INK, canvas, class_colours, draw, look_of, styled
@@ -53,7 +38,7 @@ _LABELS, _NARROW = 8, 6.0
 to which a legend below one panel has two columns."""
 
 
-def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool = False) -> list[Path]:
+def write(figures: Iterable[fig.Figure], folder: Path, units: Units, are_small: bool = False) -> list[Path]:
     """Draw every figure that has a file into `folder`; returns the files. If they `are_small`, they have few
     centimetres on paper."""
     size = _SMALL if are_small else 1.0
@@ -61,7 +46,7 @@ def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool
     return draw(plots, folder, {"axes.labelsize": _LABELS} if are_small else None)
 
 
-def drawn(figure: Figure, units: Units) -> Any:
+def drawn(figure: fig.Figure, units: Units) -> Any:
     """The figure as one of matplotlib, as large as for a screen."""
     with styled():
         return _figure(figure, units)
@@ -74,9 +59,9 @@ def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
     return sorted(lines, key=len, reverse=True)
 
 
-def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
+def _figure(spec: fig.Figure, units: Units, size: float = 1.0) -> Any:
     """The figure drawn by matplotlib, `size` times as large as usual."""
-    figure = in_units(spec, units)
+    figure = fig.in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.row_heights, figure.column_widths
     width = size * 8.2 if columns == 1 else 1.0 + _COLUMN * columns
@@ -122,7 +107,7 @@ def _legend(drawing: Any, axes: Any, columns: int) -> None:
         drawing.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=count, fontsize=9)
 
 
-def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
+def _dress(axis: Any, panel: fig.Panel, *, last: bool, first: bool) -> None:
     """Set scales, labels and title of a panel; `last` and `first` in the column that shares its x axis."""
     _scale(axis, panel.x, "x")
     _scale(axis, panel.y, "y")
@@ -141,7 +126,7 @@ def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
         above.set_xlabel(label)
 
 
-def _scale(axis: Any, spec: Axis, side: str) -> None:
+def _scale(axis: Any, spec: fig.Axis, side: str) -> None:
     """Set scale, range and ticks of one side ("x" or "y") of the axes of a panel."""
     matplotlib_axis = getattr(axis, f"{side}axis")
     if spec.names:
@@ -173,24 +158,24 @@ def _name(axis: Any, name: str) -> str | None:
     return name if name and name not in axis.get_legend_handles_labels()[1] else None
 
 
-def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
+def _draw(axis: Any, item: fig.Item, size: float = 1.0) -> None:
     """Draw an item of a panel."""
     match item:
-        case Curve():
+        case fig.Curve():
             look = look_of(item.look) | ({} if item.has_line else {"linestyle": ""})
             hollow = (
                 {"marker": item.marker, "markersize": 5.0, "markerfacecolor": "white"} if item.marker else {}
             )
             axis.plot(item.x, item.y, label=item.name if item.in_legend else None, **look, **hollow)
-        case Between():
+        case fig.Between():
             hatch = "--" if item.look == "hatched" else None
             style = {"facecolor": FILLS[item.look], "edgecolor": INK, "linewidth": 0.5, "hatch": hatch}
             axis.fill_between(item.x, item.low, item.high, label=item.name or None, **style)
-        case Shade():
+        case fig.Shade():
             span = axis.axvspan if item.axis == "x" else axis.axhspan
             style = {"facecolor": FILLS[item.look], "linewidth": 0.0, "zorder": 0}
             span(item.low, item.high, label=_name(axis, item.name), **style)
-        case Mark():
+        case fig.Mark():
             draw_line = axis.axvline if item.axis == "x" else axis.axhline
             draw_line(item.at, label=_name(axis, item.name), **look_of(item.look))
             if item.words and item.axis == "x":
@@ -200,20 +185,20 @@ def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
                     axis.annotate(item.words, (item.at, 1.0), (-1.0, -3.0), **top, **style)
                 else:
                     axis.annotate(item.words, (item.at, 1.0), (0.0, 3.0), **top, ha="center", va="bottom")
-        case Bars():
+        case fig.Bars():
             _bars(axis, item, size)
-        case Label():
+        case fig.Label():
             offset, ha, va = _PLACES[item.place]
             style = {"ha": ha, "va": va, "fontsize": 9, "bbox": _WHITE, "zorder": 6}
             axis.annotate(item.words, (item.x, item.y), offset, textcoords="offset points", **style)
-        case Field():
+        case fig.Field():
             _field(axis, item)
-        case Hatch():
+        case fig.Hatch():
             style = {"color": HATCHES[item.look % len(HATCHES)], "linewidth": 0.9}
-            axis.plot(*hatch_lines(item), label=_name(axis, item.name), **style)
+            axis.plot(*fig.hatch_lines(item), label=_name(axis, item.name), **style)
 
 
-def _bars(axis: Any, bars: Bars, size: float) -> None:
+def _bars(axis: Any, bars: fig.Bars, size: float) -> None:
     """Draw horizontal bars."""
     look = BARS[bars.look % len(BARS)]
     lying = axis.barh(
@@ -226,7 +211,7 @@ def _bars(axis: Any, bars: Bars, size: float) -> None:
         axis.margins(x=0.22)
 
 
-def _field(axis: Any, field: Field) -> None:
+def _field(axis: Any, field: fig.Field) -> None:
     """Draw a map of classes, with a line around the bold level."""
     shades = class_colours(len(field.names))
     z = np.ma.masked_invalid(classes(field))

@@ -11,6 +11,7 @@ from typing import Any
 from .. import __version__
 from ..study.record import StudyRecord, StudySetup
 from . import blocks as b
+from .analyses import analysis_sections
 from .capability import capabilities
 from .figure import Figure
 from .given_numbers import asked_speed
@@ -34,7 +35,8 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     """The sheet of a study with this report."""
     setup = study.setup
     report_sections = {section.name: section for section in report.sections}
-    checked = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
+    contents = analysis_sections()
+    checked = [name for name in contents if contents[name].on_sheet and name in report_sections]
     sections = (
         *(report_sections[name] for name in _FIRST),
         *(_on_sheet(report_sections[name]) for name in checked),

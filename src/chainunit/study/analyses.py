@@ -3,16 +3,13 @@ Two short ones of the base stand here: the ripple without feed-forward, and the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, percentage, quantity
 from ..reading.results import part, result
 from .analysis import Analysis, Findings, Work
-from .drive import Drive
 from .measures import read_measure
 from .readings import gear_drag, gear_loss, shaft_power
 from .record import StudyRecord
@@ -51,11 +48,7 @@ class FeedForwardAnalysis(Analysis):
 
     name = "ripple_without_feed_forward"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the control has feed-forward."""
-        return drive.feed_forward
+    applies = staticmethod(lambda drive, plans: drive.feed_forward)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> RippleWithout:
@@ -81,7 +74,7 @@ class GearLoss:
     without_load: Value = quantity("W", "loss without load")
     net_power: Value = quantity("W", "mean power that the machine takes")
     passed_power: Value = quantity("W", "mean of |power| that passes to and fro")
-    share: Value = quantity("1", "whole loss over the mean power that the machine takes", kind="percent")
+    share: Value = percentage("whole loss over the mean power that the machine takes")
 
 
 @result
@@ -128,11 +121,7 @@ class GearAnalysis(Analysis):
 
     name = "gear_loss"
     needs_runs, at_end = True, True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the drive has a gear with a loss."""
-        return drive.gear.d > 0.0 or drive.gear.loss > 0.0
+    applies = staticmethod(lambda drive, plans: drive.gear.d > 0.0 or drive.gear.loss > 0.0)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> GearFindings | None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from ..core.quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity, whole_number
 from ..drives.contactor import CONTACTOR_EDGE
 from ..machines.across import NO_WIDTH, PLACES, middle_of, place
 from ..machines.chain_unit import SideName, other
@@ -105,7 +105,7 @@ class Lumps(Jam):
     class Parameters(Jam.Parameters):
         """Quantities of the lumps, which are all alike."""
 
-        number: Value = quantity("1", "number of lumps", default=4, min=1, max=1000, type="Integer")
+        number: Value = whole_number("number of lumps", default=4, min=1, max=1000)
         pause: Value = _duration("time between two lumps", 0.4, least=1e-3)
 
     def _begins(self, begin: float) -> list[float]:

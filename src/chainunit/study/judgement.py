@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..core.quantities import quantity
+from ..core.quantities import percentage, quantity
 from ..reading.results import part, result
 from ..reading.text import number
 from .coupling import LESS_TORQUE
@@ -135,7 +135,7 @@ class MotorVerdict:
     text: str = part("the verdict in a sentence")
     speed: float = quantity("rad/s", "mean speed in steady running", kind="speed")
     asked: float = quantity("rad/s", "speed asked for", kind="speed")
-    least_reserve: float | None = quantity("1", "least reserve of torque", kind="percent")
+    least_reserve: float | None = percentage("least reserve of torque")
     run: str | None = part("the run of the least reserve")
     left_out: list[str] = part("runs that are left out, as their energy balance is not kept")
     limits: Mapping[str, float | None] = part("used share of each limit", unit="1", kind="used")

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.engines import MATH
 from ..core.errors import InputError, RunError, check_kind, near_name, refusal_prefix, shown
 from ..core.model import Model
-from ..core.quantities import Quantity, Variable
+from ..core.quantities import Variable, plain_variable
 from ..machines.equilibria import INDIFFERENT, STOP, Equilibria, Equilibrium
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine, InverseMachine
@@ -298,7 +298,7 @@ def _run_and_time(operating_point: str, runs: list[str]) -> tuple[str, float | N
             f'at = {shown(operating_point)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing'
         )
     try:
-        return name, to_number(Variable("at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text)
+        return name, to_number(plain_variable("at", "s", "time of the run", low=0.0, high=1e6), text)
     except ValueError as error:
         raise InputError(f'{error}; must be RUN:TIME, such as "{name}:0.4 s"') from None
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
 
-from ..core.quantities import Value, declaration, group, quantity
+from ..core.quantities import Value, declaration, group, percentage, quantity, whole_number
 from ..drives.contactor import StarDelta
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
@@ -17,6 +17,7 @@ from ..drives.motor import Motor
 from ..machines.across import NO_WIDTH, PLACES
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
+from ..reading.tables import file_key
 from ..system import NAMES
 from .file_section import FileNames, FileSection, numbers
 from .line.flywheel import MACHINE, MOTOR
@@ -41,13 +42,11 @@ class Run:
     settle_turns: Value = quantity(
         "1", "{driver} turns after the ramp, before running counts as steady", default=2.0, min=0.0, max=1e4
     )
-    turns: Value = quantity(
-        "1",
+    turns: Value = whole_number(
         "whole {driver} turns of steady running that are evaluated and that load_cycle.csv holds",
         default=1,
         min=1,
         max=10_000,
-        type="Integer",
     )
     winding_temperature: Value = quantity(
         "K",
@@ -94,13 +93,8 @@ class FlywheelTable:
         min=0.01,
         max=100.0,
     )
-    fluctuation: Value = quantity(
-        "1",
-        "permitted fluctuation of the speed, (largest - least)/mean",
-        default=0.05,
-        min=1e-4,
-        max=1.0,
-        kind="percent",
+    fluctuation: Value = percentage(
+        "permitted fluctuation of the speed, (largest - least)/mean", default=0.05, min=1e-4, max=1.0
     )
 
 
@@ -119,13 +113,11 @@ class Starter:
         min=1.0,
         max=5.0,
     )
-    droop: Value = quantity(
-        "1",
+    droop: Value = percentage(
         "fall of the frequency of an inverter at the rated torque of the motor, so that a flywheel gives its energy",
         default=0.0,
         min=0.0,
         max=0.3,
-        kind="percent",
     )
 
 
@@ -143,35 +135,25 @@ SOFTER: Mapping[str, str] = {
 """Remedies for a start that is too hard, by the start of the study."""
 
 CHOICES: Mapping[str, Any] = {
-    "feed_forward": (
-        StrictBool,
-        Field(
-            False,
-            description="whether the control of a DC motor is given the torque of a model of the machine",
-        ),
+    "feed_forward": file_key(
+        StrictBool, False, "whether the control of a DC motor is given the torque of a model of the machine"
     ),
-    "empty_start": (StrictBool, Field(False, description="whether the feed comes once the machine runs")),
-    "start": (
+    "empty_start": file_key(StrictBool, False, "whether the feed comes once the machine runs"),
+    "start": file_key(
         Literal[STARTS],
-        Field(
-            "direct",
-            description="start of a motor of the catalogue: on line, in star and delta, by a soft starter, or by "
-            "an inverter",
-        ),
+        "direct",
+        "start of a motor of the catalogue: on line, in star and delta, by a soft starter, or by an inverter",
     ),
-    "simulation": (
+    "simulation": file_key(
         Literal[SIMULATIONS],
-        Field(
-            "cs", description="how the system runs: as a co-simulation, or as one ODE of Model Exchange FMUs"
-        ),
+        "cs",
+        "how the system runs: as a co-simulation, or as one ODE of Model Exchange FMUs",
     ),
-    "catalogue": (
+    "catalogue": file_key(
         FileNames,
-        Field(
-            "",
-            description="file with motors, gears or couplings of your own (CSV or TOML), or a list of such "
-            "files; the motors stand beside the packaged ones",
-        ),
+        "",
+        "file with motors, gears or couplings of your own (CSV or TOML), or a list of such "
+        "files; the motors stand beside the packaged ones",
     ),
 }
 """Keys of every study file that stand before all tables, as pydantic fields."""
@@ -203,18 +185,11 @@ _MachineNames = _names_form("machine_names", NAMES["machine"])
 SystemTable = create_model(
     "system",
     __config__=ConfigDict(extra="forbid"),
-    machine=(
-        str,
-        Field("ChamberForces", min_length=1, description="machine: a model, a linkage file, or an FMU"),
-    ),
-    motor=(
-        str,
-        Field("", min_length=1, description="motor: a model, a designation of the catalogue, or an FMU"),
-    ),
+    machine=file_key(str, "ChamberForces", "machine: a model, a linkage file, or an FMU", min_length=1),
+    motor=file_key(str, "", "motor: a model, a designation of the catalogue, or an FMU", min_length=1),
     motor_names=(_MotorNames, Field(default_factory=_MotorNames)),
-    motor_parameters=(
-        dict[str, Any],
-        Field({}, description="parameters of a motor that is an FMU, by its names of them"),
+    motor_parameters=file_key(
+        dict[str, Any], {}, "parameters of a motor that is an FMU, by its names of them"
     ),
     machine_names=(_MachineNames, Field(default_factory=_MachineNames)),
 )
@@ -251,9 +226,8 @@ SECTIONS: Mapping[str, FileSection] = {
         FlywheelTable,
         optional=True,
         keys={
-            "compare": (
-                numbers(FlywheelTable, "J", "flywheel.compare", 12),
-                Field([], description="flywheels that are compared [kg m2]"),
+            "compare": file_key(
+                numbers(FlywheelTable, "J", "flywheel.compare", 12), [], "flywheels that are compared [kg m2]"
             )
         },
         title="Flywheel",

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, percentage, quantity
 from ..system import run_together
 from ..system.certificate import torque_names
 from .arrays import Dataset, peak
@@ -61,16 +61,12 @@ class StartNumbers:
     time_above: Value = quantity("s", "time above the rated current of the motor, as long as it is followed")
     heat: Value = quantity("J", "heat of the winding until shortly after the start")
     followed: Value = quantity("s", "time of that heat")
-    star_speed: Value = quantity(
-        "1",
-        "speed of the motor at the end of its time in star, over the synchronous one; none for another start",
-        kind="percent",
+    star_speed: Value = percentage(
+        "speed of the motor at the end of its time in star, over the synchronous one; none for another start"
     )
-    backwards: Value = quantity(
-        "1",
+    backwards: Value = percentage(
         "largest speed of the motor backwards once it has turned forwards, over the synchronous one",
         default=0.0,
-        kind="percent",
     )
 
 

@@ -126,7 +126,7 @@ def test_the_slack_free_speed_counts_in_what_is_shown(best):
     speed = best.machine.slack_speed(feed.left, feed.right) - 1e-3
     counts = []
     for limit in (0.01, speed):  # near rest no web loses its pull
-        own = _with(best.wishes, slack_free_speed=limit)
+        own = _with(best.wishes, table=_with(best.wishes.table, slack_free_speed=limit))
         search, value = Search(own), best.answer.value
         own_limits = own.objectives[0], own.limits
         counts.append(checks.neighbours(search, best.answer.x, *own_limits, value).feasible)

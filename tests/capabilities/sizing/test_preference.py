@@ -369,7 +369,7 @@ def test_no_fluctuation_is_a_limit_unless_it_is_given(tmp_path):
     assert parse("[sizing]\n").plans["sizing"].demands.fluctuation == math.inf
     config, bare = proposed("[sizing]\n")
     trial = try_motor(task_of(config), bare.motor, bare.drive, duty_by(config, tmp_path), None)
-    assert "speed" not in trial.checks() and trial.fluctuation > 0.0
+    assert "speed" not in trial.checks and trial.fluctuation > 0.0
 
 
 def wished(*names, used=1.2):

@@ -545,8 +545,8 @@ def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path):
     moved = longest.assign({"motor.air_gap_tau": 3.0 * longest["motor.air_gap_tau"]})
     most = float(np.max(np.abs(moved["motor.air_gap_tau"].values)))
     harder = dataclasses.replace(trial, shifts=(("all feed on the left", moved),))
-    assert harder.checks()["peak_torque"].value == pytest.approx(most)
-    assert harder.checks()["rms_torque"].value == trial.checks()["rms_torque"].value
+    assert harder.checks["peak_torque"].value == pytest.approx(most)
+    assert harder.checks["rms_torque"].value == trial.checks["rms_torque"].value
 
 
 def test_a_start_that_ends_while_the_motor_settles_is_read_over_all_of_it(tmp_path):

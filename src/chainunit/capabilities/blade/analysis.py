@@ -5,7 +5,6 @@ The mechanics are in `machines.knife_drive`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.cycle import Cycle, cycle
-from ...study.drive import Drive
 from ...study.operation import OperatingConditions
 from ...study.record import StudyRecord
 from ...study.remark import fault, note, warning
@@ -124,11 +122,7 @@ class BladeAnalysis(Analysis):
     """The blade of a knife drive."""
 
     name = "blade"
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the machine has a blade."""
-        return drive.machine.model.cuts
+    applies = staticmethod(lambda drive, plans: drive.machine.model.cuts)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> BladeFindings:

@@ -80,11 +80,7 @@ class ChainAnalysis(Analysis):
 
     name = "chain"
     needs_runs, at_end = True, True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Where the organs are chains."""
-        return isinstance(drive.machine, ChainUnitOfChains)
+    applies = staticmethod(lambda drive, plans: isinstance(drive.machine, ChainUnitOfChains))
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ChainResult | None:
@@ -118,8 +114,6 @@ def run_turns(
     *,
     starts: int,
     turns: int,
-    settle: int = SETTLE,
-    points: int = POINTS,
     progress: Progress = lambda share: None,
     is_stopped: Callable[[], bool] | None = None,
 ) -> Turns:
@@ -130,7 +124,7 @@ def run_turns(
     fmu : the machine with chains
     drive : the drive with this machine
     outputs : names of the outputs to read
-    starts, turns, settle, points : see `Turns`, `SETTLE`, `POINTS`
+    starts, turns : see `Turns`
     progress : a function that is called with the share of the work that is complete
     is_stopped : a function that says whether to stop, see `stoppable`; by default Ctrl-C stops the run
 
@@ -142,7 +136,7 @@ def run_turns(
     rods = [f"{side}.pull_{k + 1}" for side in SIDES for k in range(sum(rods_of(drive)))]
     names = [*outputs, *rods]
     ratio = drive.driven_machine.p.ratio
-    step = 2.0 * math.pi / crank_speed / points
+    step = 2.0 * math.pi / crank_speed / POINTS
     parameters = drive.simulated_machine.by_name | Layout(Feed).by_name(feed)
     finished = itertools.count(1)
 
@@ -155,13 +149,13 @@ def run_turns(
             unit.initialize(parameters | {"phi": phi * ratio, "w": crank_speed * ratio, "a": 0.0}, 0.0)
             unit.finish_initialization()
             handle = unit.handle(names)
-            rows = np.empty((turns * points, len(names)))
-            for k in range(settle):
-                unit.step(k * points * step, points * step)
-            for k in range(turns * points):
+            rows = np.empty((turns * POINTS, len(names)))
+            for k in range(SETTLE):
+                unit.step(k * POINTS * step, POINTS * step)
+            for k in range(turns * POINTS):
                 if stop():
                     raise InterruptedRunError(f"interrupted at {crank_speed:g} rad/s")
-                unit.step((settle * points + k) * step, step)
+                unit.step((SETTLE * POINTS + k) * step, step)
                 rows[k] = unit.read(handle)
             return rows
         finally:
@@ -171,10 +165,10 @@ def run_turns(
     guard = nullcontext(is_stopped) if is_stopped else stoppable()
     with guard as stop, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
         rows = list(pool.map(run_of, range(starts), [stop] * starts))
-    series = np.array(rows).reshape(starts, turns, points, len(names))
+    series = np.array(rows).reshape(starts, turns, POINTS, len(names))
     pulls = np.split(series[..., len(outputs) :], len(SIDES), axis=-1)
     return Turns(
-        angle=2.0 * math.pi * np.arange(1, points + 1) / points,
+        angle=2.0 * math.pi * np.arange(1, POINTS + 1) / POINTS,
         values={name: series[..., k] for k, name in enumerate(outputs)},
         pulls=dict(zip(SIDES, pulls, strict=True)),
     )
@@ -359,12 +353,14 @@ def study_chain(
             except RunError as error:
                 failures[w] = str(error)
     rows.sort(key=lambda n: float(n.speed))
+    # of two bars, in a very slow turn
+    at_rest = peak(cycle(drive.machine, 1e-6, feed).outputs.rocker.tau)
     walls, webs = rods_of(drive)
     names = [f"{part} {k + 1}" for part, count in (("wall", walls), ("web", webs)) for k in range(count)]
     result = ChainResult(
         own=mine,
         speeds=tuple(rows),
-        avoid=tuple(bands(rows, _rocker_at_rest(drive, feed), 0.5 * spacing)),
+        avoid=tuple(bands(rows, at_rest, 0.5 * spacing)),
         critical=tuple(critical),
         slack_by_rod={
             side: [RodSlack(name, float(share)) for name, share in zip(names, shares, strict=True)]
@@ -377,12 +373,6 @@ def study_chain(
         failures=failures,
     )
     return result, interruption
-
-
-def _rocker_at_rest(drive: Drive, feed: Feed) -> float:
-    """Largest rocker torque of two bars in a very slow turn [N.m]."""
-    slowly = cycle(drive.machine, 1e-6, feed)
-    return peak(slowly.outputs.rocker.tau)
 
 
 def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf) -> list[Band]:

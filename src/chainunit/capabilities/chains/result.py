@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Findings
@@ -44,17 +44,17 @@ class SpeedNumbers:
         "1", "number of independent turns for which all turns count, least of the three peaks"
     )
     snatch_spread: Value = quantity("1", "largest over least of the starts' medians of it")
-    slack_time: Value = quantity("1", "share of the time in which a rod is slack", kind="percent")
-    slack_time_from: Value = quantity("1", "interval of that share, from", kind="percent")
-    slack_time_to: Value = quantity("1", "interval of that share, to", kind="percent")
-    slack_rods: Value = quantity("1", "share of the rods that are slack, mean over time", kind="percent")
+    slack_time: Value = percentage("share of the time in which a rod is slack")
+    slack_time_from: Value = percentage("interval of that share, from")
+    slack_time_to: Value = percentage("interval of that share, to")
+    slack_rods: Value = percentage("share of the rods that are slack, mean over time")
     fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
     two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
     two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
     two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
     two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over theirs at rest")
-    two_bar_slack_time: Value = quantity(
-        "1", "share of the time in which a bar is pushed, by its mean axial pull as a rod's", kind="percent"
+    two_bar_slack_time: Value = percentage(
+        "share of the time in which a bar is pushed, by its mean axial pull as a rod's"
     )
     energy_residual: Value = quantity("1", "largest energy residual of an organ over the energy moved")
 

@@ -48,14 +48,10 @@ class CheckCapability(Capability):
         from . import page
 
         return {
-            "checks": Contents("Checks by clause", page.blocks),
+            "checks": Contents("Checks by clause", page.blocks, on_sheet=True),
             "relay_classes": Contents("Classes of the thermal relay", page.relay, analysis="checks"),
             "not_checked": Contents("Parts that were not checked", page.missing, analysis="checks"),
         }
-
-    def on_sheet(self) -> tuple[str, ...]:
-        """The table of the checks."""
-        return ("checks",)
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """What was not checked, and why."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, StrictBool
+from pydantic import StrictBool
 
-from ...core.quantities import Value, declaration, quantity, variables
+from ...core.quantities import Value, declaration, quantity, variables, whole_number
 from ...drives.catalogue_flexible import FlexibleCouplingValues
 from ...drives.gear_rating import GearRating
 from ...reading.lists import TableList
+from ...reading.tables import file_key
 from ...study.file_section import FileSection, of_named
 from ...study.relay import CLASSES
 
@@ -37,9 +38,7 @@ class BearingTable:
         max=50.0,
     )
     static_safety: Value = quantity("1", "static safety C0/F that is asked for", above=0.0, max=100.0)
-    elements: Value = quantity(
-        "1", "number of rolling elements of a row", min=3.0, max=1000.0, type="Integer"
-    )
+    elements: Value = whole_number("number of rolling elements of a row", min=3.0, max=1000.0)
     diameter_ratio: Value = quantity(
         "1",
         "diameter of a rolling element, times the cosine of the contact angle, over the pitch diameter",
@@ -71,7 +70,7 @@ BEARINGS = TableList(
     most=100,
     declared=BearingTable,
     keys={
-        "kind": (Literal[KINDS], Field(None, description="kind of the bearing")),
+        "kind": file_key(Literal[KINDS], None, "kind of the bearing"),
     },
     conditions={
         "required": ["kind"],
@@ -283,23 +282,15 @@ SECTIONS = TableList(
     most=100,
     declared=SectionTable,
     keys={
-        "pin": (
-            str,
-            Field("", description="pin whose force bends it, by the first word of its title, or all of it"),
-        ),
-        "on": (Literal[PARTS], Field(PARTS[0], description="part that it is on")),
-        "notch": (Literal[NOTCHES], Field(None, description="notch in it")),
-        "steel": (
-            Literal[STEELS],
-            Field(None, description="kind of steel, whose strengths fall with the diameter"),
-        ),
-        "hard_surface": (StrictBool, Field(False, description="whether its surface layer is hard")),
-        "mean_stress": (
+        "pin": file_key(str, "", "pin whose force bends it, by the first word of its title, or all of it"),
+        "on": file_key(Literal[PARTS], PARTS[0], "part that it is on"),
+        "notch": file_key(Literal[NOTCHES], None, "notch in it"),
+        "steel": file_key(Literal[STEELS], None, "kind of steel, whose strengths fall with the diameter"),
+        "hard_surface": file_key(StrictBool, False, "whether its surface layer is hard"),
+        "mean_stress": file_key(
             Literal[RATIO, CONSTANT],
-            Field(
-                RATIO,
-                description="whether mean stress and amplitude grow in one ratio, or the mean is constant",
-            ),
+            RATIO,
+            "whether mean stress and amplitude grow in one ratio, or the mean is constant",
         ),
     },
     conditions={"required": list(SECTION_NEEDS)},
@@ -320,17 +311,16 @@ TABLES = {
         RelayTable,
         optional=True,
         keys={
-            "trip_class": (
+            "trip_class": file_key(
                 Literal[tuple(relay_class.name for relay_class in CLASSES)],
-                Field(None, description="trip class of IEC 60947-4-1"),
+                None,
+                "trip class of IEC 60947-4-1",
             ),
-            "place": (
+            "place": file_key(
                 Literal[RELAY_PLACES],
-                Field(
-                    IN_PHASES,
-                    description="place of the relay of a star-delta starter: in the phases of the delta, set to "
-                    "1/sqrt(3) of the rated current, or in the supply line",
-                ),
+                IN_PHASES,
+                "place of the relay of a star-delta starter: in the phases of the delta, set to "
+                "1/sqrt(3) of the rated current, or in the supply line",
             ),
         },
         title="Thermal overload relay",
@@ -363,13 +353,10 @@ TABLES = {
         FlexibleCouplingTable,
         optional=True,
         keys={
-            "designation": (
-                str,
-                Field(
-                    "", description="designation of a flexible coupling of the catalogues that the file names"
-                ),
+            "designation": file_key(
+                str, "", "designation of a flexible coupling of the catalogues that the file names"
             ),
-            "place": (Literal[PLACES], Field("motor", description="shaft that it is on")),
+            "place": file_key(Literal[PLACES], "motor", "shaft that it is on"),
         },
         title="Flexible coupling",
         follows={"start_factor": "by the starts an hour"},

@@ -76,11 +76,7 @@ class EnergyCapability(Capability):
         """Losses, a year, and a life."""
         from . import page
 
-        return {"energy": Contents("Energy", page.blocks, (page.PICTURE,))}
-
-    def on_sheet(self) -> tuple[str, ...]:
-        """Its section."""
-        return ("energy",)
+        return {"energy": Contents("Energy", page.blocks, (page.PICTURE,), on_sheet=True)}
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The energy of a study without the table."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from ...core.errors import InputError, RunError
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...drives.catalogue import CatalogueMotor
 from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
@@ -48,7 +47,7 @@ class LoadEnergy:
     """A load of the machine in steady running."""
 
     losses: Losses = part(inline=True)
-    share: float = quantity("1", "share of the running time", kind="percent")
+    share: float = percentage("share of the running time")
     factor: float = quantity("1", "factor on the feed")
 
 
@@ -73,7 +72,7 @@ class MotorComparison:
 
     better: str = part("the motor that takes less energy; empty where both take the same")
     saving: float = quantity("J", "energy that it saves a year", kind="energy")
-    saving_share: float = quantity("1", "the same over the energy with the other motor", kind="percent")
+    saving_share: float = percentage("the same over the energy with the other motor")
     cost_saving: float | None = quantity("1", "cost that it saves a year")
     extra_price: float | None = quantity("1", "price that it costs more")
     pays_after: float | None = quantity("1", "years until it has paid; 0 where it costs no more")
@@ -166,11 +165,7 @@ class EnergyAnalysis(Analysis):
 
     name = "energy"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the study asks for it, and the motor is one of this package."""
-        return plans["energy"] is not None and drive.foreign is None
+    applies = staticmethod(lambda drive, plans: plans["energy"] is not None and drive.foreign is None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> EnergyFindings | None:

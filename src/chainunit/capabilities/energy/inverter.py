@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage
 
 POINTS = ((0.0, 0.25), (0.0, 0.5), (0.0, 1.0), (0.5, 0.25), (0.5, 0.5), (0.5, 1.0), (0.9, 0.5), (0.9, 1.0))
 """Operating points: frequency over the rated one, torque-producing current over the rated one."""
@@ -39,7 +39,7 @@ IE2 = 0.75
 class InverterTable:
     """A loss of an inverter at one operating point."""
 
-    loss: Value = quantity("1", "loss over the rated apparent power", min=0.0, max=1.0, kind="percent")
+    loss: Value = percentage("loss over the rated apparent power", min=0.0, max=1.0)
 
 
 def apparent_power(motor_power: float) -> float:

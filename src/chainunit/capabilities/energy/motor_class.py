@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...core.quantities import quantity
+from ...core.quantities import percentage
 from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.record import StudyRecord
@@ -20,7 +20,7 @@ class MotorClass(Findings):
         "the class that EU 2019/1781 asks of it; empty outside of the scope of that regulation"
     )
     falls_short: bool = part("whether its class is below that")
-    efficiency: float = quantity("1", "rated efficiency", kind="percent")
+    efficiency: float = percentage("rated efficiency")
     no_class: str = part("the reason why its class is not known here; empty where it is", default="")
 
     def remark(self, study: StudyRecord) -> None:

@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import Field
-
 from ...core.errors import Faults, InputError
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...reading.lists import TableList
+from ...reading.tables import file_key
 from ...study.file_section import numbers
 from .inverter import POINTS, InverterTable
 
@@ -56,7 +55,7 @@ class Usage:
 class LoadShare:
     """A load, and the share of the running time in which the machine has it."""
 
-    share: Value = quantity("1", "share of the running time", default=1.0, above=0.0, max=1.0, kind="percent")
+    share: Value = percentage("share of the running time", default=1.0, above=0.0, max=1.0)
     factor: Value = quantity(
         "1", "factor on the feed of the study: 1 as it is, 0 running empty", default=1.0, min=0.0, max=10.0
     )
@@ -68,29 +67,25 @@ LOADS = TableList(
     description="loads of the machine, each with its share of the running time; together they are 100 %",
     most=12,
     declared=LoadShare,
-    keys={"name": (str, Field("", max_length=40, description="name of the load"))},
+    keys={"name": file_key(str, "", "name of the load", max_length=40)},
     follows={"name": "load 1, load 2, .."},
 )
 """The entries [[usage.load]]."""
 
 FIELDS: Mapping[str, Any] = {
-    "other": (
+    "other": file_key(
         str,
-        Field(
-            "",
-            description="motor of the catalogue that is compared over the life; without it the same motor in the "
-            "next efficiency class",
-        ),
+        "",
+        "motor of the catalogue that is compared over the life; without it the same motor in the "
+        "next efficiency class",
     ),
-    "inverter_losses": (
+    "inverter_losses": file_key(
         numbers(InverterTable, "loss", "usage.inverter_losses", len(POINTS)),
-        Field(
-            [],
-            description="losses of the inverter by its maker over its rated apparent power, at the eight operating "
-            "points of IEC 61800-9-2 (frequency %; current %): "
-            + ", ".join(f"({100 * f:g}; {100 * i:g})" for f, i in POINTS)
-            + "; without them three quarters of the losses of the reference drive, the limit of class IE2",
-        ),
+        [],
+        "losses of the inverter by its maker over its rated apparent power, at the eight operating "
+        "points of IEC 61800-9-2 (frequency %; current %): "
+        + ", ".join(f"({100 * f:g}; {100 * i:g})" for f, i in POINTS)
+        + "; without them three quarters of the losses of the reference drive, the limit of class IE2",
     ),
     "load": LOADS.field,
 }

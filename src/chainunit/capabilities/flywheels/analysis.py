@@ -4,10 +4,9 @@ fluctuation."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import Dataset
 from ...study.catalogue_drive import with_inertia
 from ...study.cycle import needed_inertia
-from ...study.drive import Drive
 from ...study.limits import given_motor
 from ...study.line.shaft import driveline_of, remedies
 from ...study.measures import Answers, read_answers
@@ -120,11 +118,7 @@ class FlywheelAnalysis(Analysis):
 
     name = "flywheels"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the study asks for flywheels, and the motor is one of this package."""
-        return plans["flywheels"] is not None and drive.foreign is None
+    applies = staticmethod(lambda drive, plans: plans["flywheels"] is not None and drive.foreign is None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> FlywheelFindings:

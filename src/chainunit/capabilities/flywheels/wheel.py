@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...reading.results import derived, part, result
 from ...study.arrays import Dataset
 from ...study.limits import Check
@@ -23,8 +23,8 @@ class FlywheelAnswers:
     speed_mean: Value = same_measure("speed_mean")
     speed_least: Value = same_measure("speed_least")
     speed_ripple: Value = same_measure("speed_ripple")
-    motor_ripple: Value = quantity("1", "ripple of the motor's speed", kind="percent")
-    by_hand: Value = quantity("1", "ripple by hand, dE/(J w2)", kind="percent")
+    motor_ripple: Value = percentage("ripple of the motor's speed")
+    by_hand: Value = percentage("ripple by hand, dE/(J w2)")
     motor_torque_peak: Value = same_measure("motor_torque_peak")
     motor_torque_rms: Value = same_measure("motor_torque_rms")
     current_peak: Value = same_measure("current_peak")
@@ -37,7 +37,7 @@ class FlywheelAnswers:
     cycle_gap: Value = same_measure("cycle_gap")
     speed_drift: Value = same_measure("speed_drift")
     energy_gap: Value = same_measure("energy_gap")
-    residual: Value = quantity("1", "energy residual", kind="percent")
+    residual: Value = percentage("energy residual")
 
 
 @result

@@ -60,17 +60,7 @@ class IdentificationCapability(Capability):
 
     def plan(self, reading: FileReading) -> IdentificationPlan | None:
         """The plan of the table; None for a machine that was refused."""
-        if "identify" not in reading.data or reading.machine is None:
-            return None
-        values = reading.values
-        declared = [(reading.machine.p, "machine"), (values["feed"], "feed")]
-        if reading.parts.gives_motor:
-            declared.append((values["motor"], "motor"))
-        fixed = {"machine.ratio": "is needed to read the recordings; count the teeth"}
-        speed = values["run"].crank_speed
-        return read_identification(
-            reading.form.identify, values["identify"], declared, speed, fixed, reading.source
-        )
+        return read_identification(reading) if "identify" in reading.data else None
 
     def files(self, data: Mapping[str, Any]) -> Iterator[FileReference]:
         """The recordings."""

@@ -25,9 +25,9 @@ FILE = "identified.toml"
 
 def identification_report(machine: IdentifiedMachine) -> b.Report:
     """The report on an identification."""
-    summary, config = summary_of(machine), machine.config
-    x = cited(summary)
+    config = machine.config
     with shown_in(config.units):
+        x = cited(summary := summary_of(machine))
         return b.Report(
             config.title or "Identified machine",
             "Identification from recordings",

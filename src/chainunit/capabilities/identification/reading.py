@@ -5,22 +5,24 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 from ...core.errors import Faults, InputError, near_name
 from ...core.messages import unit_behind
-from ...core.quantities import Layout, Quantity, Variable, named_values
+from ...core.quantities import Variable, named_values, plain_variable, variable_of
 from ...core.units import split
 from ...reading.lists import Entry, leaves
 from ...recordings.measurands import MEASURANDS
 from ...recordings.table import PlannedRecording, read_span, recording_values
 from ...recordings.unknown import Unknown
+from ...study.config import FileReading
 from .table import RUNS, SENSORS, SOUGHT, IdentifyTable, RunTable
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 _FIXED = {"mark": "stands for the mark of a turn; give it another"}
 """Names that no run may have, each with the reason."""
+_KNOWN = {"machine.ratio": "is needed to read the recordings; count the teeth"}
+"""Numbers that cannot be sought, each with the reason."""
 _ANALOG = [name for name, measurand in MEASURANDS.items() if measurand.analog]
 
 
@@ -66,42 +68,32 @@ class IdentificationPlan:
         return self.sensors.get(column, self.usual)
 
 
-def read_identification(
-    form: Any,
-    table: IdentifyTable,
-    declared: Sequence[tuple[Any, str]],
-    crank_speed: float,
-    fixed: Mapping[str, str],
-    source: str,
-) -> IdentificationPlan:
-    """The plan of a checked table [identify]: its `form` with what the file gives, and its declared values `table`.
-
-    Parameters
-    ----------
-    declared : instances of the declarations whose numbers can be sought, each with the name of its table
-    crank_speed : the speed of a run that does not give its own [rad/s]
-    fixed : by the full name of a number that cannot be sought, the reason
-    source : the study file; recordings are named relative to it
+def read_identification(reading: FileReading) -> IdentificationPlan | None:
+    """The plan of a study with a checked table [identify]; None for a machine that was refused.
 
     Raises
     ------
     InputError
         with a line for each fault: the key, its value and the allowed range.
     """
-    numbers = {
-        v.name: (v, value) for instance, name in declared for v, value in named_values(instance, f"{name}.")
-    }
-    faults = Faults()
+    if reading.machine is None:
+        return None
+    form, table = reading.form.identify, reading.values["identify"]
+    crank_speed, faults = reading.values["run"].crank_speed, Faults()
+    declared = {"machine": reading.machine.p, "feed": reading.values["feed"]}
+    if reading.parts.gives_motor:
+        declared["motor"] = reading.values["motor"]
+    numbers = {v.name: (v, value) for name, p in declared.items() for v, value in named_values(p, f"{name}.")}
 
     def read_run(entry: Entry, name: str) -> PlannedRun:
         """A run; an amount may be added to sought numbers alone."""
-        run = _run(entry, name, crank_speed, numbers, source)
+        run = _run(entry, name, crank_speed, numbers, reading.source)
         for other in sorted(run.added.keys() - sought.keys()) if not faults.errors else ():
             entry.fault(f"added.{other}", "is not sought; add [[identify.parameter]] with this name")
         return run
 
     sought = SOUGHT.read(
-        form.parameter, faults, lambda entry, name: _sought(entry, name, *numbers[name]), numbers, fixed
+        form.parameter, faults, lambda entry, name: _sought(entry, name, *numbers[name]), numbers, _KNOWN
     )
     for name, meaning in (("parameter", "a number that is sought"), ("run", "a recording")):
         if not getattr(form, name):
@@ -156,8 +148,8 @@ def _deviation(entry: Entry, variable: Variable, value: float) -> float:
         deviation = parts[0] / 100.0 * abs(value)
     else:
         kind = "difference" if variable.unit == "K" else ""
-        quantity = Quantity(variable.unit, "standard deviation", low=0.0, open_low=True, kind=kind)
-        deviation = entry.quantity("deviation", Variable("", quantity.description, quantity), stated)
+        positive = plain_variable("", variable.unit, "standard deviation", low=0.0, open_low=True, kind=kind)
+        deviation = entry.quantity("deviation", positive, stated)
         entry.refuse()
     if not (math.isfinite(deviation) and deviation > 0.0):
         share = f"{value:g}{unit_behind(variable.unit)}"
@@ -188,8 +180,8 @@ def _run(
         if full not in numbers:
             entry.fault(f"added.{full}", f"no such number of the study{near_name(full, numbers)}")
             continue
-        quantity = Quantity(numbers[full][0].unit, "amount that was added")
-        added[full] = entry.quantity(f"added.{full}", Variable("", quantity.description, quantity), value)
+        amount = plain_variable("", numbers[full][0].unit, "amount that was added")
+        added[full] = entry.quantity(f"added.{full}", amount, value)
     speeds = tuple(_speeds(entry))
     values = recording_values(entry, crank_speed, source)
     return PlannedRun(
@@ -204,19 +196,16 @@ def _run(
 
 def _speeds(entry: Entry) -> Iterator[tuple[float, float, float]]:
     """The changes of the speed, in order."""
-    quantities = {v.name: v.quantity for v in Layout(RunTable).variables}
-    duration = Quantity("s", "duration of the change", low=0.0, open_low=True)
-    kinds = (quantities["begin"], duration, quantities["crank_speed"])
+    begin_time, speed_then = (variable_of(RunTable, name) for name in ("begin", "crank_speed"))
+    duration = plain_variable("", "s", "duration of the change", low=0.0, open_low=True)
+    kinds = (begin_time, duration, speed_then)
     end = -math.inf
     for k, change in enumerate(entry.given.get("speeds", []), 1):
         if len(change) != len(kinds):
             reason = 'must be a list of begin, duration and crank speed, such as ["5 s", "1 s", "2 rad/s"]'
             entry.wrong("speeds", change, reason)
             continue
-        begin, lasts, speed = (
-            entry.quantity("speeds", Variable("", q.description, q), x)
-            for x, q in zip(change, kinds, strict=True)
-        )
+        begin, lasts, speed = (entry.quantity("speeds", v, x) for x, v in zip(change, kinds, strict=True))
         if begin < end:
             entry.fault("speeds", f"change {k} begins before the one before it ends, at {end:g} s")
         end = begin + lasts
@@ -228,8 +217,8 @@ def _sensor(entry: Entry, column: str, table: IdentifyTable) -> SensorKnowledge:
     content, numbers = entry.given, dict[str, float]()
     for name in ("offset", "resolution"):
         if name in content:
-            quantity = Quantity(MEASURANDS[column].unit, f"{name} of the sensor", low=0.0)
-            numbers[name] = entry.quantity(name, Variable("", quantity.description, quantity), content[name])
+            size = plain_variable("", MEASURANDS[column].unit, f"{name} of the sensor", low=0.0)
+            numbers[name] = entry.quantity(name, size, content[name])
     return SensorKnowledge(
         float(content.get("noise", table.noise)),
         float(content.get("gain", table.gain)),

@@ -12,7 +12,6 @@ import numpy as np
 from ...core.messages import unit_behind
 from ...core.quantities import quantity
 from ...reading.results import GIVEN, OWN, InUnit, difference, part, result
-from ...reading.text import shown_in
 from ...recordings.fit import FittedValue, fitted_values
 from ...recordings.measurands import MEASURANDS
 from ...recordings.residuals import EXCESS_NOISE, ResidualTest
@@ -153,13 +152,7 @@ class IdentificationSummary:
 
 
 def summary_of(machine: IdentifiedMachine) -> IdentificationSummary:
-    """All results of an identification, with texts in the units of the study."""
-    with shown_in(machine.config.units):
-        return _summary(machine)
-
-
-def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
-    """All that the report and result.json say of an identification."""
+    """All that the report and result.json say of an identification; its texts have the units of `shown_in`."""
     best, estimates, start = machine.best, machine.estimates, machine.information_at_start
     return IdentificationSummary(
         heading=Heading.of(machine.config.title, machine.config.file),

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import Field
-
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity, whole_number
 from ...reading.lists import TableList
+from ...reading.tables import file_key
 from ...recordings.table import COLUMNS, FILE, FROM_RECORDING, RecordingTable
 from ...study.file_section import entered, filled_text
 
@@ -21,26 +20,22 @@ MOST_SPEEDS = 200
 class IdentifyTable:
     """The identification of a machine from recordings of its motor."""
 
-    noise: Value = quantity(
-        "1",
+    noise: Value = percentage(
         "standard deviation of the noise of a sensor, in parts of the RMS of its column; of sensors without a table",
         default=0.01,
         min=1e-6,
         max=1.0,
-        kind="percent",
     )
-    gain: Value = quantity(
-        "1",
+    gain: Value = percentage(
         "standard deviation of the gain of a sensor; of sensors without a table",
         default=0.01,
         min=0.0,
         max=1.0,
-        kind="percent",
     )
-    starts: Value = quantity(
-        "1", "number of starts of the fit, spread over the bounds", default=1, min=1, max=100, type="Integer"
+    starts: Value = whole_number(
+        "number of starts of the fit, spread over the bounds", default=1, min=1, max=100
     )
-    seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
+    seed: Value = whole_number("seed of the starts", default=1, min=0, max=1_000_000_000)
 
 
 @declaration
@@ -56,17 +51,10 @@ class RunTable(RecordingTable):
 class SensorTable:
     """The knowledge of a sensor."""
 
-    noise: Value = quantity(
-        "1",
-        "standard deviation of its noise, in parts of the RMS of its column",
-        default=0.01,
-        min=1e-6,
-        max=1.0,
-        kind="percent",
+    noise: Value = percentage(
+        "standard deviation of its noise, in parts of the RMS of its column", default=0.01, min=1e-6, max=1.0
     )
-    gain: Value = quantity(
-        "1", "standard deviation of its gain", default=0.01, min=0.0, max=1.0, kind="percent"
-    )
+    gain: Value = percentage("standard deviation of its gain", default=0.01, min=0.0, max=1.0)
 
 
 SOUGHT = TableList(
@@ -108,28 +96,21 @@ RUNS = TableList(
     keys={
         "name": filled_text("name of the run, in small letters, digits and _"),
         "file": FILE,
-        "feed": (
-            Literal[FEEDS],
-            Field(
-                "same", description="feed of the machine: the one that is sought in all loaded runs, or none"
-            ),
+        "feed": file_key(
+            Literal[FEEDS], "same", "feed of the machine: the one that is sought in all loaded runs, or none"
         ),
-        "speeds": (
+        "speeds": file_key(
             list[list[Any]],
-            Field(
-                [],
-                max_length=MOST_SPEEDS,
-                description="smooth changes of the speed reference, each a list of its time in the recording, its "
-                "duration, and the crank speed after it",
-            ),
+            [],
+            "smooth changes of the speed reference, each a list of its time in the recording, its "
+            "duration, and the crank speed after it",
+            max_length=MOST_SPEEDS,
         ),
         "columns": COLUMNS,
-        "added": (
+        "added": file_key(
             dict[str, Any],
-            Field(
-                {},
-                description="what was added to a sought number for this run, by its full name: a known mass",
-            ),
+            {},
+            "what was added to a sought number for this run, by its full name: a known mass",
         ),
     },
 )

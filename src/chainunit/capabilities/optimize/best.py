@@ -79,7 +79,7 @@ class Best:
     @property
     def is_limited(self) -> bool:
         """Whether the study has limits beside the one that the machine turns."""
-        return bool(self.wishes.limits or self.wishes.slack_free_speed)
+        return bool(self.wishes.limits or self.wishes.table.slack_free_speed)
 
     @property
     def met(self) -> bool:
@@ -113,7 +113,7 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     """
     search, idle = effective_search(wishes)
     wishes = search.wishes
-    starts, moved = search.starts(wishes.starts)
+    starts, moved = search.starts(int(wishes.table.starts))
     answers = _from_starts(search, starts, wishes.objectives[0], progress)
     good = [answer for answer in answers if answer.feasible]
     failure = None
@@ -190,7 +190,7 @@ def _values(search: Search, x: Any) -> dict[str, float]:
 def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
     """The least mean pull along a web up to the slack-free speed, of today's machine and of the machine with the free
     parameters `x` [N], see `Best.pulls`; NaN where one does not turn."""
-    if not search.wishes.slack_free_speed:
+    if not search.wishes.table.slack_free_speed:
         return None
     today, here = (search.least_pull(p) if search.turns(p) else math.nan for p in (search.today, x))
     return today, here
@@ -205,7 +205,7 @@ def _front(
     """The front of two objectives: the first is least while the second is limited, step by step."""
     first, second = search.wishes.objectives
     answers = [answer for answer in _from_starts(search, starts, second, progress) if answer.feasible]
-    limits, total = list(search.wishes.limits), search.wishes.pareto_points
+    limits, total = list(search.wishes.limits), int(search.wishes.table.pareto_points)
     ends = [best, min(answers, key=lambda answer: answer.value)] if answers else [best]
     # at either end the other objective is as small as it can be
     corner = search.solve(best.x, second, [*limits, TurnLimit(first, None, best.value * (1.0 + AGREES))])

@@ -8,10 +8,9 @@ from ...report.capability import Capability
 from ...study.config import FileReading
 from ...study.file_section import FileSection, TableForm, TableLists
 from ...study.organs import finer_models
-from ...study.parts import motor_is_left
 from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule
-from .table import FIELDS, Optimize, read_wishes
-from .wishes import Wishes
+from .table import FIELDS, read_wishes
+from .wishes import Optimize, Wishes
 
 
 class OptimizeCapability(Capability):
@@ -39,14 +38,7 @@ class OptimizeCapability(Capability):
 
     def plan(self, reading: FileReading) -> Wishes | None:
         """The wishes that the table states."""
-        if "optimize" not in reading.data:
-            return None
-        loads, run = reading.values["feed"], reading.values["run"]
-        by_motor = bool(reading.parts.designation or motor_is_left(reading.data))
-        table, form = reading.values["optimize"], reading.form.optimize
-        return read_wishes(
-            table, form, reading.parts.machine, reading.machine, loads, run.crank_speed, by_motor
-        )
+        return read_wishes(reading) if "optimize" in reading.data else None
 
 
 CAPABILITY = OptimizeCapability()

@@ -34,7 +34,7 @@ class Neighbours:
 def around(search: Search, x: Any) -> Any:
     """Free parameters around `x`, shape (neighbours, free): each one alone to both sides, and random directions."""
     columns, n = search.columns, search.columns.size
-    rng = np.random.default_rng(search.wishes.seed)
+    rng = np.random.default_rng(int(search.wishes.table.seed))
     directions = rng.normal(size=(_RANDOM, n))
     directions /= np.max(np.abs(directions), axis=1, keepdims=True)
     directions = np.concatenate([np.eye(n), -np.eye(n), directions])
@@ -56,13 +56,14 @@ def neighbours(
         for name, column in zip(search.wishes.names, points.T, strict=True)
     }
     # so few states take less time than a compiler
-    arguments = search.wishes.crank_speed, search.wishes.feed, values, search.wishes.basis, FINE
+    arguments = search.wishes.crank_speed, search.wishes.feed, values, search.wishes.table, FINE
     table = evaluate(machine, quantities, *arguments, engine="numpy")
-    turns = (table.reason.values == 0) & np.array([_clear(search, point) for point in points])
-    met = turns
+    near = search.wishes.table.clearance * search.columns.distances(search.base) * (1.0 - 1e-9)
+    distances = np.array([search.columns.distances(point) for point in points])
+    met = (table.reason.values == 0) & np.all(distances >= near, axis=1)
     for limit in limits:
         met &= _meets(limit, table[limit.name].values)
-    if search.wishes.slack_free_speed:
+    if search.wishes.table.slack_free_speed:
         met[met] = [search.least_pull(point) >= 0.0 for point in points[met]]
     better = met & (table[objective.name].values < value * (1.0 - math.copysign(_TOLERANCE, value)))
     # the values at the angles of a grid are a little too small: the candidates are computed exactly
@@ -72,11 +73,6 @@ def neighbours(
         widened = [_widened(limit, search.value(limit.quantity, x)) for limit in limits]
         count = sum(_is_better(search, point, objective, widened, value) for point in points[better])
     return Neighbours(len(points), int(np.sum(met)), count)
-
-
-def _clear(search: Search, x: Any) -> bool:
-    today = search.columns.distances(search.base)
-    return bool(np.all(search.columns.distances(x) >= search.wishes.clearance * today * (1.0 - 1e-9)))
 
 
 def _widened(limit: TurnLimit, value: float) -> TurnLimit:

@@ -59,7 +59,7 @@ def conflict(search: Search, starts: Sequence[Any], first: Answer) -> Conflict:
     """All limits that cannot be met alone, and a smallest set of others that cannot be met together; `first` is the
     nearest machine under all limits."""
     wishes = search.wishes
-    slack = [SLACK] if wishes.slack_free_speed else []
+    slack = [SLACK] if wishes.table.slack_free_speed else []
     names = [*(limit.name for limit in wishes.limits), *slack, TURNS]
     # the nearest machine is the best start: a limit less moves it little
     starts = [first.x, *starts]

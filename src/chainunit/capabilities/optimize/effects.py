@@ -49,7 +49,7 @@ def effective_search(wishes: Wishes) -> tuple[Search, dict[str, tuple[float, flo
 def no_effect(wishes: Wishes, names: tuple[str, ...]) -> str:
     """Words on parameters without an effect: ``ratio has no effect on peak(crank_torque)``."""
     objectives = ", ".join(q.name for q in wishes.objectives)
-    limits = " and the limits" if wishes.limits or wishes.slack_free_speed else ""
+    limits = " and the limits" if wishes.limits or wishes.table.slack_free_speed else ""
     return f"{', '.join(names)} {'have' if len(names) > 1 else 'has'} no effect on {objectives}{limits}"
 
 
@@ -64,7 +64,7 @@ def _changes(search: Search) -> np.ndarray:
         # the installed power is that of the shaft, whatever its gear
         names = ["power"] if quantity.name == "installed_power" else [i.column for i in quantity.integrands]
         groups.append(([columns.whole(name) for name in names], wishes.crank_speed))
-    groups += [(search.pulls, wishes.slack_free_speed)] if search.pulls else []
+    groups += [(search.pulls, wishes.table.slack_free_speed)] if search.pulls else []
     largest = np.zeros(columns.size)
     for x in [search.base, *search.starts(_MACHINES)[0]]:
         for places, w in groups:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.quantities import narrowed, quantity
+from ...core.quantities import narrowed, percentage, quantity
 from ...reading.results import OWN, InUnit, part, result
 from ...reading.text import Units
 from ...study.cycle_quantities import CycleBasis
@@ -116,7 +116,7 @@ class BestMachine:
     status: str = part("whether a machine meets all limits")
     objectives: list[str] = part("the objectives")
     speed: float = quantity("rad/s", "crank speed", kind="speed")
-    clearance: float = quantity("1", "distance from where the machine no longer turns", kind="percent")
+    clearance: float = percentage("distance from where the machine no longer turns")
     slack_free_speed: float | None = quantity(
         "rad/s", "crank speed up to which no web goes slack", kind="speed"
     )
@@ -144,9 +144,9 @@ def best_machine(best: Best, heading: Heading) -> BestMachine:
         status="complete" if best.met else CONFLICT,
         objectives=[q.name for q in wishes.objectives],
         speed=wishes.crank_speed,
-        clearance=wishes.clearance,
-        slack_free_speed=wishes.slack_free_speed or None,
-        basis=narrowed(wishes.basis, CycleBasis),
+        clearance=wishes.table.clearance,
+        slack_free_speed=wishes.table.slack_free_speed or None,
+        basis=narrowed(wishes.table, CycleBasis),
         parameters=dict(_parameters(best)),
         without_effect=list(best.idle),
         without_effect_words=idle_sentence(best),
@@ -166,7 +166,11 @@ def best_machine(best: Best, heading: Heading) -> BestMachine:
             values=InUnit(best.values, objective.unit),
             effort=best.effort,
         ),
-        neighbours=None if best.neighbours is None else _neighbours(best, best.neighbours),
+        neighbours=None
+        if best.neighbours is None
+        else NeighbourCheck(
+            neighbours_sentence(best), [q.name for q in wishes.objectives[1:]], STEPS, best.neighbours
+        ),
         front=_front(best),
         over_turn={
             name: InUnit(y[::EVERY], "rad" if name == "angle" else "N.m") for name, y in best.turns.items()
@@ -243,11 +247,6 @@ def _conflict(best: Best) -> WhyNone | None:
     return WhyNone(
         conflict.names, tuple(conflict.alone), conflict.together, bounds, list(conflict_sentences(best))
     )
-
-
-def _neighbours(best: Best, neighbours: Neighbours) -> NeighbourCheck:
-    held = [q.name for q in best.wishes.objectives[1:]]
-    return NeighbourCheck(neighbours_sentence(best), held, STEPS, neighbours)
 
 
 def _front(best: Best) -> list[FrontMachine]:

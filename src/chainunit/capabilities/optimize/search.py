@@ -83,7 +83,7 @@ class Search:
     def __init__(self, wishes: Wishes) -> None:
         self.wishes, self.today = wishes, wishes.today
         self.columns = Columns(wishes)
-        sides = wishes.machine.loaded_sides(wishes.feed) if wishes.slack_free_speed else ()
+        sides = wishes.machine.loaded_sides(wishes.feed) if wishes.table.slack_free_speed else ()
         self.pulls = [self.columns.whole(f"mean_pull({side}.web)") for side in sides]
         quantities = (*wishes.objectives, *(limit.quantity for limit in wishes.limits))
         self._turning = [self.columns.whole(i.column) for q in quantities for i in q.integrands]
@@ -105,7 +105,7 @@ class Search:
         """
         low, span = self.columns.low, self.columns.span
         clipped = np.clip(self.today, low, low + span)
-        for x in (clipped, *(low + span * _sobol(len(low), 4096, self.wishes.seed))):
+        for x in (clipped, *(low + span * _sobol(len(low), 4096, int(self.wishes.table.seed)))):
             if self.turns(x):
                 return x
         obstacle = " cannot be assembled at each angle."
@@ -138,7 +138,7 @@ class Search:
             else:
                 mean = self._mean(x, k, reduction)
                 parts.append(math.sqrt(mean) if reduction == "rms" else mean)
-        return float(q.combine(parts, self.wishes.crank_speed * self.columns.ratio(x), self.wishes.basis))
+        return float(q.combine(parts, self.wishes.crank_speed * self.columns.ratio(x), self.wishes.table))
 
     def _mean(self, x: Any, k: int, reduction: str) -> float:
         """The mean of a column over the turn, or, for "rms", that of its square."""
@@ -161,7 +161,7 @@ class Search:
 
         def pulls(q: Any, shares: Any) -> Any:
             """The least pull of all webs at these angles and shares of the slack-free speed."""
-            w = np.repeat(np.atleast_1d(shares) * self.wishes.slack_free_speed, len(q))
+            w = np.repeat(np.atleast_1d(shares) * self.wishes.table.slack_free_speed, len(q))
             values = self.columns.values(x, np.tile(q, np.size(shares)), w, self.pulls)
             return np.min(values, axis=(0, 1)).reshape(np.size(shares), len(q))
 
@@ -184,7 +184,7 @@ class Search:
         """Points that fill the bounds evenly, each moved towards `base` until the machine can be assembled; and the
         number of points that were moved."""
         points, moved = [], 0
-        for y in _sobol(self.columns.size, number, self.wishes.seed + seed):
+        for y in _sobol(self.columns.size, number, int(self.wishes.table.seed) + seed):
             way, share = self.columns.low + self.columns.span * y - self.base, 1.0
             while not self.turns(self.base + share * way):
                 share *= 0.5
@@ -197,7 +197,7 @@ class Search:
     ) -> tuple[LimitRows, dict[str, int]]:
         """The rows near `x`, and, without an objective, the slacks by their limits."""
         wishes, sizes = self.wishes, self.columns.distances(self.base)
-        rows = LimitRows(self.columns, wishes.basis, partial(self._turn, x))
+        rows = LimitRows(self.columns, wishes.table, partial(self._turn, x))
         if objective is not None:
             least = -math.inf if objective.reduction in _SIGNED else 0.0
             rows.at_most(objective, "", self.scales[objective.name], objective=rows.auxiliary(0.0, least))
@@ -216,7 +216,7 @@ class Search:
         names = [wishes.machine.model.required[subject].subject for subject in self.columns.subjects]
         rows.distances("", 0.0, sizes, names)
         if TURNS not in without:
-            rows.distances(TURNS, wishes.clearance, sizes, names)
+            rows.distances(TURNS, wishes.table.clearance, sizes, names)
         return rows, rows.loosen() if objective is None else {}
 
     def solve(
@@ -272,7 +272,7 @@ class Search:
         """The solution of a program of these rows, which serves for all numbers that they have as upper limits."""
         key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, lanes.sizes
         if key not in self._programs:
-            speeds = self.wishes.crank_speed, self.wishes.slack_free_speed
+            speeds = self.wishes.crank_speed, self.wishes.table.slack_free_speed
             auxiliary = len(rows.begin)
             self._programs[key] = TurnProgram(self.columns, speeds, rows.rows, costs, auxiliary, lanes.sizes)
         upper = np.array([row.upper for row in rows.rows])
@@ -313,7 +313,7 @@ class Search:
 
     def _speeds(self, row: Row) -> list[float]:
         """The crank speeds at which a row over the turn stands [rad/s]."""
-        highest = self.wishes.slack_free_speed
+        highest = self.wishes.table.slack_free_speed
         return [share * highest for share in CHECKED] if row.kind == "slack" else [self.wishes.crank_speed]
 
     def _tops(self, row: Row, x: Any, aux: Any) -> Any:

@@ -6,94 +6,52 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from pydantic import Field
-
 from ...core.errors import Faults, InputError, near_name, refusal_prefix
 from ...core.messages import unit_behind
-from ...core.quantities import Quantity, Value, Variable, declaration, quantity
-from ...machines.machine import Machine
+from ...core.quantities import Variable, plain_variable
 from ...mechanism.models import MachineModel
 from ...reading.lists import Entry, leaves, read_entries
-from ...study.cycle_quantities import CycleBasis, CycleQuantity, cycle_quantity
+from ...reading.tables import file_key
+from ...study.config import FileReading
+from ...study.cycle_quantities import CycleQuantity, cycle_quantity
+from ...study.parts import motor_is_left
 from .wishes import SLACK, TurnLimit, Wishes
 
 USUAL_OBJECTIVE = "peak(crank_torque)"
 _ENDS = ("min", "max")
 
 
-@declaration
-class Optimize(CycleBasis):
-    """The search for the best machine."""
-
-    clearance: Value = quantity(
-        "1",
-        "least distance from the limits within which the machine turns, as a share of the distance of today",
-        default=0.02,
-        min=1e-6,
-        max=1.0,
-        kind="percent",
-    )
-    slack_free_speed: Value = quantity(
-        "rad/s",
-        "crank speed up to which no web goes slack: its mean pull stays above 0; with 0 there is no such limit",
-        default=0.0,
-        min=0.0,
-        max=1000.0,
-        kind="speed",
-    )
-    starts: Value = quantity(
-        "1", "number of starts, spread over the bounds", default=20, min=1, max=10_000, type="Integer"
-    )
-    seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
-    pareto_points: Value = quantity(
-        "1", "number of points of the front of two objectives", default=9, min=2, max=200, type="Integer"
-    )
-
-
 FIELDS: Mapping[str, Any] = {
-    "objectives": (
+    "objectives": file_key(
         list[str],
-        Field(
-            [],
-            max_length=2,
-            description=f"one or two quantities of the turn that are to be least; without it {USUAL_OBJECTIVE}",
-        ),
+        [],
+        f"one or two quantities of the turn that are to be least; without it {USUAL_OBJECTIVE}",
+        max_length=2,
     ),
-    "free": (
-        dict[str, Any],
-        Field({}, description="parameters of the machine that may change, each with { min, max }"),
-    ),
-    "limits": (
-        dict[str, Any],
-        Field({}, description="limits of quantities of the turn, each with { min }, { max } or both"),
+    "free": file_key(dict[str, Any], {}, "parameters of the machine that may change, each with { min, max }"),
+    "limits": file_key(
+        dict[str, Any], {}, "limits of quantities of the turn, each with { min }, { max } or both"
     ),
 }
 """Keys of the table that are no quantities, as pydantic fields."""
 
 
-def read_wishes(
-    table: Optimize,
-    form: Any,
-    model: MachineModel,
-    machine: Machine | None,
-    feed: Any,
-    crank_speed: float,
-    of_catalogue: bool,
-) -> Wishes | None:
-    """The wishes of a checked table [optimize]: its declared values `table`, and its `form` with what the file
-    gives; None for a machine that was refused. `of_catalogue` tells whether the motor, and so the ratio, is of the
-    catalogue.
+def read_wishes(reading: FileReading) -> Wishes | None:
+    """The wishes of a study with a checked table [optimize]; None for a machine that was refused.
 
     Raises
     ------
     InputError
         with a line for each fault: the key, its value and the allowed range.
     """
-    faults = Faults()
+    form, table, model = reading.form.optimize, reading.values["optimize"], reading.parts.machine
+    machine, feed, faults = reading.machine, reading.values["feed"], Faults()
     objectives: list[CycleQuantity] = []
     for name in form.objectives or [USUAL_OBJECTIVE]:
         with faults.collected(), refusal_prefix("optimize.objectives: ", "optimize.objectives"):
             objectives.append(cycle_quantity(name, model))
+    # the motor, and so the ratio, is of the catalogue
+    of_catalogue = bool(reading.parts.designation or motor_is_left(reading.data))
     free = _free(form.free, model, of_catalogue, faults)
     limits = read_entries(
         form.limits.items(), "optimize.limits", faults, lambda entry, name: _limit(entry, name, model)
@@ -107,16 +65,11 @@ def read_wishes(
     return Wishes(
         machine=machine,
         feed=feed,
-        crank_speed=float(crank_speed),
+        crank_speed=float(reading.values["run"].crank_speed),
         objectives=tuple(objectives),
         free=free,
         limits=tuple(limits),
-        clearance=float(table.clearance),
-        slack_free_speed=float(table.slack_free_speed),
-        basis=table,
-        starts=int(table.starts),
-        seed=int(table.seed),
-        pareto_points=int(table.pareto_points),
+        table=table,
     )
 
 
@@ -191,7 +144,7 @@ def _limit(entry: Entry, name: str, model: MachineModel) -> TurnLimit:
     """The limit that a table states for the quantity of that name."""
     with refusal_prefix("optimize.limits: ", entry.place):
         q = cycle_quantity(name, model)
-    variable = Variable(name, q.description, Quantity(q.unit, q.description))
+    variable = plain_variable(name, q.unit, q.description)
     low, high, unit = _ends(entry, variable, "min, max, or both")
     if low > high:
         entry.fault("", f"max = {high:g}{unit} must be >= min = {low:g}{unit}")

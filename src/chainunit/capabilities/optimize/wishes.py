@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+from ...core.quantities import Value, declaration, percentage, quantity, whole_number
 from ...machines.machine import Machine
 from ...study.cycle_quantities import CycleBasis, CycleQuantity
 
@@ -14,6 +15,31 @@ TURNS = "clearance"
 """The limit that the machine turns, with a distance."""
 SLACK = "slack_free_speed"
 """The limit that no web goes slack up to a speed."""
+
+
+@declaration
+class Optimize(CycleBasis):
+    """The search for the best machine."""
+
+    clearance: Value = percentage(
+        "least distance from the limits within which the machine turns, as a share of the distance of today",
+        default=0.02,
+        min=1e-6,
+        max=1.0,
+    )
+    slack_free_speed: Value = quantity(
+        "rad/s",
+        "crank speed up to which no web goes slack: its mean pull stays above 0; with 0 there is no such limit",
+        default=0.0,
+        min=0.0,
+        max=1000.0,
+        kind="speed",
+    )
+    starts: Value = whole_number("number of starts, spread over the bounds", default=20, min=1, max=10_000)
+    seed: Value = whole_number("seed of the starts", default=1, min=0, max=1_000_000_000)
+    pareto_points: Value = whole_number(
+        "number of points of the front of two objectives", default=9, min=2, max=200
+    )
 
 
 @dataclass(frozen=True)
@@ -48,14 +74,7 @@ class Wishes:
     free: Mapping[str, tuple[float, float]]
     """least and largest value of each free parameter"""
     limits: tuple[TurnLimit, ...]
-    clearance: float
-    """distance from the requirements of the model, as a share of the value of today"""
-    slack_free_speed: float = 0.0
-    """crank speed up to which no web goes slack [rad/s]; 0 without that wish"""
-    basis: CycleBasis = field(default_factory=CycleBasis)
-    starts: int = 20
-    seed: int = 1
-    pareto_points: int = 9
+    table: Optimize
 
     @property
     def names(self) -> tuple[str, ...]:

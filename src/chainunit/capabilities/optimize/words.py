@@ -43,11 +43,6 @@ class Binding:
     """change of the objective by one unit"""
 
 
-def step_of(unit: str) -> tuple[float, str]:
-    """A step of a quantity, and its words."""
-    return _UNITS.get(unit, (1.0, number(1.0, unit, full=False)))
-
-
 def bindings(best: Best) -> list[Binding]:
     """The limits, the slack-free speed and the bounds of parameters that bind, the strongest first."""
     assert best.answer is not None
@@ -72,7 +67,7 @@ def bindings(best: Best) -> list[Binding]:
 def _binding(best: Best, name: str, side: str, value: Any, unit: str, slope: float) -> Binding:
     """A binding with its words: ``1 mm more of r.max lowers peak(crank_torque) by 0.3 N m``."""
     objective, *others = best.wishes.objectives
-    step, step_words = step_of(unit)
+    step, step_words = _UNITS.get(unit, (1.0, number(1.0, unit, full=False)))
     change = slope * step
     verb, amount = "lowers" if change < 0.0 else "raises", number(abs(change), objective.unit, objective.kind)
     held = "".join(f", with {q.name} held at {number(best.found[q.name], q.unit, q.kind)}" for q in others)
@@ -89,7 +84,7 @@ def clearances(best: Best) -> list[str]:
     slopes = {
         subject: slope for (owner, subject), slope in best.answer.sensitivities.items() if owner == TURNS
     }
-    return [subject for subject, slope in slopes.items() if abs(slope) * best.wishes.clearance > least]
+    return [subject for subject, slope in slopes.items() if abs(slope) * best.wishes.table.clearance > least]
 
 
 def idle_sentence(best: Best) -> str:
@@ -153,9 +148,11 @@ def conflict_sentences(best: Best) -> Iterator[str]:
 def _wish_words(best: Best, name: str) -> str:
     """A limit, the slack-free speed, or the need to turn, in words."""
     if name == SLACK:
-        return f"webs that keep their pull up to {number(best.wishes.slack_free_speed, 'rad/s', 'speed')}"
+        return (
+            f"webs that keep their pull up to {number(best.wishes.table.slack_free_speed, 'rad/s', 'speed')}"
+        )
     if name == TURNS:
-        return f"a distance of {number(best.wishes.clearance, '1', 'percent')} from where it no longer turns"
+        return f"a distance of {number(best.wishes.table.clearance, '1', 'percent')} from where it no longer turns"
     return limit_words(next(limit for limit in best.wishes.limits if limit.name == name))
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from pydantic import Field
-
 from ...core.errors import refusal_prefix
+from ...reading.tables import file_key
 from ...report.blocks import Text
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...study.analysis import Analysis
@@ -31,12 +30,10 @@ class RandomOverloads(Capability):
         "monte_carlo": FileSection(
             MonteCarlo,
             keys={
-                "event": (
+                "event": file_key(
                     dict[str, Any],
-                    Field(
-                        {},
-                        description="event that comes at random: keys of an [[event]], quantities may be ranges",
-                    ),
+                    {},
+                    "event that comes at random: keys of an [[event]], quantities may be ranges",
                 )
             },
             title="Overloads at random",

@@ -28,7 +28,6 @@ from ...reading.results import Estimate, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import Dataset
 from ...study.block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
-from ...study.drive import Drive
 from ...study.event import AnySide, Event
 from ...study.event_table import RandomEvent
 from ...study.limits import limit_reached
@@ -416,11 +415,7 @@ class RandomAnalysis(Analysis):
 
     name = "monte_carlo"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the study asks for runs."""
-        return bool(plans["random_overloads"].runs)
+    applies = staticmethod(lambda drive, plans: bool(plans["random_overloads"].runs))
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> MonteCarloResult:

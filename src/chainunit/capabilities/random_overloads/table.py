@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, quantity, whole_number
 from ...study.event_table import RandomRuns
 
 
@@ -12,15 +12,11 @@ from ...study.event_table import RandomRuns
 class MonteCarlo:
     """Overloads at random crank angles and times."""
 
-    runs: Value = quantity(
-        "1", "number of runs; with 0 there are none", default=0, min=0, max=1_000_000, type="Integer"
-    )
+    runs: Value = whole_number("number of runs; with 0 there are none", default=0, min=0, max=1_000_000)
     duration: Value = quantity(
         "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
     )
-    seed: Value = quantity(
-        "1", "seed of the random numbers", default=1, min=0, max=1_000_000_000, type="Integer"
-    )
+    seed: Value = whole_number("seed of the random numbers", default=1, min=0, max=1_000_000_000)
 
 
 @dataclass(frozen=True)

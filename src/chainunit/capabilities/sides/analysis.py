@@ -15,7 +15,6 @@ from ...reading.results import InUnit, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.cycle import cycle
-from ...study.drive import Drive
 from ...study.organ_limits import two_bar_limits
 from ...study.record import StudyRecord
 from .factors import OverloadFactors, cycle_alone, overload_factors
@@ -142,11 +141,7 @@ class OrganAnalysis(Analysis):
     """The organs of a chain unit with the feed of normal running."""
 
     name = "organs"
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the machine has working organs on its sides."""
-        return bool(drive.machine.model.sides)
+    applies = staticmethod(lambda drive, plans: bool(drive.machine.model.sides))
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> OrganFindings:

@@ -76,17 +76,7 @@ class SizingCapability(Capability):
         # the table of another capability, if the program has it
         if "hours" in reading.data.get("usage", {}) and "hours" not in reading.data["sizing"]:
             demands = replace(demands, hours=reading.values["usage"].hours)
-        return SizingChoice(
-            demands,
-            form.gear_kind,
-            form.ratio_series,
-            form.ratios,
-            form.objective,
-            form.own_only,
-            form.separate_bearing,
-            form.load_class,
-            form.motors,
-        )
+        return SizingChoice(demands, **{key: getattr(form, key) for key in SIZING_KEYS})
 
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refuse values of a gear beside gears of a catalogue, which have their own."""

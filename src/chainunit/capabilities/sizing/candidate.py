@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...drives.catalogue import CatalogueMotor
 from ...drives.catalogue_gears import CatalogueGear
 from ...drives.disc import Disc, steel_disc
@@ -42,7 +42,7 @@ class Flywheel:
     diameter: Value = quantity("m", "steel disc, diameter")
     width: Value = quantity("m", "steel disc, width")
     rim_speed: Value = quantity("m/s", "steel disc, speed of the rim")
-    fluctuation: Value = quantity("1", "fluctuation of the {driver} speed in the run", kind="percent")
+    fluctuation: Value = percentage("fluctuation of the {driver} speed in the run")
 
 
 @declaration

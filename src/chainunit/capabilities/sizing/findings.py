@@ -15,7 +15,6 @@ from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import as_used
 from ...study.coupling import remark_on_rams
-from ...study.drive import Drive
 from ...study.operation import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
@@ -292,11 +291,7 @@ class ProtectionAnalysis(Analysis):
 
     name = "protection"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the study asks for sizing."""
-        return plans["sizing"] is not None
+    applies = staticmethod(lambda drive, plans: plans["sizing"] is not None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> None:

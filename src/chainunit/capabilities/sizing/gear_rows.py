@@ -130,11 +130,6 @@ def gear_checks(
     return checks
 
 
-def is_overtaxed(c: Candidate) -> bool:
-    """Whether the candidate takes more of a limit of its gear than it may."""
-    return any(c.exceeds(name) for name in c.checks if name.startswith("gear"))
-
-
 def spent(c: Candidate, tried: Iterable[Candidate]) -> Candidate | None:
     """The candidate `c` without runs, if its gear surely does not hold: it gets the runs of a candidate that was
     `tried` with another gear, and the limits of its gear. None if it has to be tried itself."""
@@ -166,7 +161,9 @@ def helps(gear: CatalogueGear, tried: Iterable[Candidate]) -> bool:
     """Whether a further gear may make a motor fit: not where the motor itself exceeds a limit with a gear that is as
     efficient."""
     return not any(
-        c.sold is not None and not is_overtaxed(c) and c.sold.data.efficiency >= gear.data.efficiency
+        c.sold is not None
+        and not any(c.exceeds(name) for name in c.checks if name.startswith("gear"))
+        and c.sold.data.efficiency >= gear.data.efficiency
         for c in tried
     )
 

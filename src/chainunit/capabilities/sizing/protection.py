@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from ...core.quantities import Value, declaration, quantity, variables
+from ...core.quantities import Value, declaration, percentage, quantity, variables
 from ...study.coupling import LESS_TORQUE
 
 MARGIN = 1.25
@@ -194,11 +194,9 @@ class WayNumbers:
     running: Value = quantity("N.m", "largest torque of running on the coupling")
     start: Value = quantity("N.m", "largest torque of a start on the coupling")
     start_time: Value = quantity("s", "longest start-up")
-    voltage: Value = quantity("1", "share of the voltage at the start", kind="percent")
+    voltage: Value = percentage("share of the voltage at the start")
     ramp: Value = quantity("s", "ramp of the voltage or of the speed")
-    boost: Value = quantity(
-        "1", "boost of the inverter: share of the voltage at frequency zero", kind="percent"
-    )
+    boost: Value = percentage("boost of the inverter: share of the voltage at frequency zero")
     slip_time: Value = quantity("s", "time for which the clutch slips in a start")
     slip_energy: Value = quantity("J", "heat of the slip in a start")
     slip_power: Value = quantity("W", "heat of the slip while the machine is blocked and the motor runs on")

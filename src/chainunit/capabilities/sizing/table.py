@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from pydantic import Field, StrictBool
+from pydantic import StrictBool
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity, whole_number
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import Transmission
 from ...drives.service_factor import LOAD_CLASSES, LOAD_WORDS, belt_factor, gear_factor, load_class
+from ...reading.tables import file_key
 from ...study.catalogue_drive import GearOffer
 from ...study.file_section import numbers
 from ...study.operation import DriveTables
@@ -21,30 +22,21 @@ from ...study.operation import DriveTables
 class Sizing:
     """The demands on a motor from the catalogue."""
 
-    one_sided_share: Value = quantity(
-        "1",
-        "share of the running time with all feed on one side",
-        default=0.1,
-        min=0.0,
-        max=1.0,
-        kind="percent",
+    one_sided_share: Value = percentage(
+        "share of the running time with all feed on one side", default=0.1, min=0.0, max=1.0
     )
     starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
-    fluctuation: Value = quantity(
-        "1",
+    fluctuation: Value = percentage(
         "permitted fluctuation of the {driver} speed, (largest - least)/mean; checked only where it is given",
         default=0.05,
         above=0.0,
         max=1.0,
-        kind="percent",
     )
-    margin: Value = quantity(
-        "1",
+    margin: Value = percentage(
         "share of each limit that the chosen drive leaves free; not of the tolerance of the {driver} speed",
         default=0.1,
         min=0.0,
         max=0.9,
-        kind="percent",
     )
     breakdown_margin: Value = quantity(
         "1", "factor between the peak torque and the pull-out torque", default=1.25, min=1.0, max=10.0
@@ -61,8 +53,8 @@ class Sizing:
     temperature: Value = quantity(
         "K", "permitted temperature of the winding", default=393.15, min=330.0, max=500.0
     )
-    poles_least: Value = quantity("1", "least number of poles", default=2, min=2, max=48, type="Integer")
-    poles_most: Value = quantity("1", "largest number of poles", default=6, min=2, max=48, type="Integer")
+    poles_least: Value = whole_number("least number of poles", default=2, min=2, max=48)
+    poles_most: Value = whole_number("largest number of poles", default=6, min=2, max=48)
     frequency: Value = quantity(
         "Hz",
         "rated frequency of the motors that are tried, as of the supply",
@@ -95,13 +87,11 @@ class Sizing:
     hours: Value = quantity(
         "1", "hours of running a day, for the service factor", default=16.0, above=0.0, max=24.0
     )
-    candidates: Value = quantity(
-        "1",
+    candidates: Value = whole_number(
         "least number of motors that are tried; further ones are tried until no later one could rank higher",
         default=9,
         min=1,
         max=200,
-        type="Integer",
     )
 
 
@@ -117,61 +107,49 @@ MOTORS = (STANDARD, HIGH_SLIP)
 """The packaged motors that are tried."""
 
 SIZING_KEYS: Mapping[str, Any] = {
-    "motors": (
+    "motors": file_key(
         Literal[MOTORS],
-        Field(
-            STANDARD,
-            description="packaged motors that are tried: standard ones, or those of high slip (NEMA design D), with "
-            "which a flywheel gives its energy to the peaks of the load",
-        ),
+        STANDARD,
+        "packaged motors that are tried: standard ones, or those of high slip (NEMA design D), with "
+        "which a flywheel gives its energy to the peaks of the load",
     ),
-    "gear_kind": (
+    "gear_kind": file_key(
         Literal[tuple(UNITS)],
-        Field(
-            "helical",
-            description="kind of the gear, by which one unit has a largest ratio; a belt of a larger ratio stands "
-            "before a helical gear; none: the machine is on the motor's shaft or a coupling",
-        ),
+        "helical",
+        "kind of the gear, by which one unit has a largest ratio; a belt of a larger ratio stands "
+        "before a helical gear; none: the machine is on the motor's shaft or a coupling",
     ),
-    "load_class": (
+    "load_class": file_key(
         Literal[LOAD_CLASSES],
-        Field(
-            None,
-            description="class of the load for the service factor: uniform, with moderate, heavy or very heavy "
-            "shocks (crushers on a belt); without it, it follows from the inertia of the machine over that of the "
-            "motor",
-        ),
+        None,
+        "class of the load for the service factor: uniform, with moderate, heavy or very heavy "
+        "shocks (crushers on a belt); without it, it follows from the inertia of the machine over that of the "
+        "motor",
     ),
-    "ratio_series": (
+    "ratio_series": file_key(
         Literal[RATIO_SERIES],
-        Field(
-            "preferred",
-            description="gear ratio: a preferred number of ISO 3, or exactly the one that gives the speed",
-        ),
+        "preferred",
+        "gear ratio: a preferred number of ISO 3, or exactly the one that gives the speed",
     ),
-    "ratios": (
+    "ratios": file_key(
         numbers(Transmission, "ratio", "sizing.ratios", 500, is_empty_allowed=False),
-        Field([], description="gear ratios on offer, of a catalogue of gears, in place of the series"),
+        [],
+        "gear ratios on offer, of a catalogue of gears, in place of the series",
     ),
-    "objective": (
+    "objective": file_key(
         Literal[OBJECTIVES],
-        Field(
-            PREFERENCE,
-            description="the chosen drive of the fitting ones: the first by the order of preference, or the "
-            "one of the lowest price of motor and gear",
-        ),
+        PREFERENCE,
+        "the chosen drive of the fitting ones: the first by the order of preference, or the "
+        "one of the lowest price of motor and gear",
     ),
-    "own_only": (
-        StrictBool,
-        Field(False, description="whether only motors of catalogues of your own are tried, no packaged ones"),
+    "own_only": file_key(
+        StrictBool, False, "whether only motors of catalogues of your own are tried, no packaged ones"
     ),
-    "separate_bearing": (
+    "separate_bearing": file_key(
         StrictBool,
-        Field(
-            False,
-            description="whether the crank has bearings of its own, so that the shaft of a gear of the catalogue "
-            "does not carry its reaction",
-        ),
+        False,
+        "whether the crank has bearings of its own, so that the shaft of a gear of the catalogue "
+        "does not carry its reaction",
     ),
 }
 

@@ -285,24 +285,19 @@ class Trial:
         share = float(self._demands.one_sided_share)
         return [(1.0 - share, self.steady), (share, self.one_sided[self.heavier])]
 
+    @property
+    def torque_mean(self) -> float:
+        """Mean air-gap torque of the duty [N m]."""
+        return sum(share * float(np.mean(run[_GAP])) for share, run in self._cases)
+
     def result(self) -> TrialResult:
         """Its results."""
-        is_started = self.start_time is not None
-        return TrialResult(
-            checks=self.checks(),
-            relay_seconds=self.relay_seconds,
-            start_current=self.start_current,
-            inverter_current=self.inverter_current,
-            speed=self.speed if is_started else None,
-            frequency=self.frequency if is_started else None,
-            duty=self.duty,
-            torque_mean=sum(share * float(np.mean(run[_GAP])) for share, run in self._cases),
-            fluctuation=self.fluctuation,
-            inertia_factor=self.inertia_factor,
-            stall_angle=self.stall_angle,
-            failed_angle=self.failed_angle,
-        )
+        names = {entry.name for entry in dataclasses.fields(TrialResult)}
+        # of a motor that does not start, the speed and the frequency mean nothing
+        known = names if self.start_time is not None else names - {"speed", "frequency"}
+        return TrialResult(**{name: getattr(self, name) for name in known})
 
+    @property
     def checks(self) -> dict[str, Check]:
         """Each value beside its limit, by name; the value is None where the machine does not get up to speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters

@@ -23,7 +23,7 @@ from ...batch.transients import can_run
 from ...core.brief import briefly_shown
 from ...core.errors import Faults, InputError
 from ...core.native.compilers import COMPILERS
-from ...core.quantities import Layout, Quantity, Variable, variables
+from ...core.quantities import Layout, Variable, plain_variable, variables
 from ...machines.machine import Machine
 from ...reading.results import InUnit
 from ...study.arrays import Dataset
@@ -82,8 +82,7 @@ class SweepTask:
         """Parameters, quantities and measures by name."""
         declared = {parameter.name: parameter.variable for parameter in self.plan.parameters}
         for q in self.quantities:
-            of_turn = Quantity(q.unit, q.description, kind=q.kind)
-            declared[q.name] = Variable(q.name, q.description, of_turn)
+            declared[q.name] = plain_variable(q.name, q.unit, q.description, kind=q.kind)
         answers = {v.name: v for v in variables(Answers)}
         return declared | {name: answers[name] for name in self.plan.measures}
 

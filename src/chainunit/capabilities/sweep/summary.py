@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.brief import briefly_shown
-from ...core.quantities import quantity
+from ...core.quantities import percentage, quantity
 from ...reading.results import OWN, Estimate, InUnit, part, result
 from ...reading.text import shown_in
 from ...study.cycle_quantities import CycleBasis
@@ -51,7 +51,7 @@ class ReasonShare:
 
     reason: str = part("the reason")
     points: int = quantity("1", "number of points")
-    share: float = quantity("1", "share of all points", kind="percent")
+    share: float = percentage("share of all points")
 
 
 @result
@@ -60,7 +60,7 @@ class OrganShare:
 
     limit: SpeedLimit = part(inline=True)
     points: int = quantity("1", "number of points beyond it")
-    share: float = quantity("1", "share of all points", kind="percent")
+    share: float = percentage("share of all points")
 
 
 @result

@@ -7,12 +7,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from ...core.errors import Faults, InputError, near_name, one_of, refusal_prefix, shown
 from ...core.messages import unit_behind
-from ...core.quantities import Quantity, Value, Variable, declaration, named_values, quantity, variables
+from ...core.quantities import (
+    Value,
+    Variable,
+    declaration,
+    named_values,
+    plain_variable,
+    variables,
+    whole_number,
+)
 from ...reading.lists import Entry, TableList
+from ...reading.tables import file_key
 from ...study.config import FileReading
 from ...study.cycle_quantities import CycleBasis, cycle_quantity
 from ...study.event import Event
@@ -44,18 +52,11 @@ MOST_PARAMETERS, MOST_VALUES, MOST_RESULTS = 32, 1000, 40
 class SweepTable(CycleBasis):
     """A sweep over parameters of the study."""
 
-    points: Value = quantity(
-        "1",
-        "number of points; of a grid that of its parameters",
-        default=1024,
-        min=1,
-        max=1_000_000_000,
-        type="Integer",
+    points: Value = whole_number(
+        "number of points; of a grid that of its parameters", default=1024, min=1, max=1_000_000_000
     )
-    seed: Value = quantity(
-        "1", "seed of the points, except of a grid", default=1, min=0, max=1_000_000_000, type="Integer"
-    )
-    angles: Value = quantity("1", "crank angles of a turn", default=720, min=8, max=100_000, type="Integer")
+    seed: Value = whole_number("seed of the points, except of a grid", default=1, min=0, max=1_000_000_000)
+    angles: Value = whole_number("crank angles of a turn", default=720, min=8, max=100_000)
 
 
 SWEPT = TableList(
@@ -82,18 +83,12 @@ SWEPT = TableList(
         "from": entered("least value"),
         "to": entered("largest value"),
         "points": entered("number of values of a grid between these, 11 by default; of a tolerance 3"),
-        "values": (
-            list[Entered],
-            Field([], max_length=MOST_VALUES, description="values, in place of from and to"),
-        ),
+        "values": file_key(list[Entered], [], "values, in place of from and to", max_length=MOST_VALUES),
         "tolerance": entered("largest difference from the value of the study, in place of from and to"),
-        "distribution": (
+        "distribution": file_key(
             Literal[DISTRIBUTIONS],
-            Field(
-                "uniform",
-                description="of a tolerance, where the method is no grid; of a normal one it is 3 standard "
-                "deviations",
-            ),
+            "uniform",
+            "of a tolerance, where the method is no grid; of a normal one it is 3 standard deviations",
         ),
     },
 )
@@ -101,32 +96,26 @@ SWEPT = TableList(
 
 
 FIELDS: Mapping[str, Any] = {
-    "method": (
+    "method": file_key(
         Literal[METHODS],
-        Field(
-            "sobol", description="points: all combinations of values (a grid), or points that fill the space"
-        ),
+        "sobol",
+        "points: all combinations of values (a grid), or points that fill the space",
     ),
-    "quantities": (
+    "quantities": file_key(
         list[str],
-        Field(
-            [],
-            max_length=MOST_RESULTS,
-            description='quantities of a turn, such as "peak(crank_torque)" or "installed_power"',
-        ),
+        [],
+        'quantities of a turn, such as "peak(crank_torque)" or "installed_power"',
+        max_length=MOST_RESULTS,
     ),
-    "measures": (
-        list[str],
-        Field([], max_length=len(MEASURES_OF_SWEEP), description="measures of a run with the event"),
+    "measures": file_key(
+        list[str], [], "measures of a run with the event", max_length=len(MEASURES_OF_SWEEP)
     ),
-    "event": (str, Field("", description="event of the measures, by the name of its run")),
-    "best": (str, Field("", description="quantity or measure by which points are ranked")),
-    "best_is": (
+    "event": file_key(str, "", "event of the measures, by the name of its run"),
+    "best": file_key(str, "", "quantity or measure by which points are ranked"),
+    "best_is": file_key(
         Literal["least", "largest"],
-        Field(
-            "least",
-            description="which of its values is best; of a load, where best is not given, the largest",
-        ),
+        "least",
+        "which of its values is best; of a load, where best is not given, the largest",
     ),
     "parameter": SWEPT.field,
 }
@@ -290,18 +279,14 @@ def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -
     return SweptParameter(variable, centre, values, low, high, wide)
 
 
-_COUNT = Variable(
-    "",
-    "number of values",
-    Quantity("1", "number of values", low=2.0, high=float(MOST_VALUES), type="Integer"),
-)
+_COUNT = plain_variable("", "1", "number of values", low=2.0, high=float(MOST_VALUES), type="Integer")
 
 
 def _tolerance_of(v: Variable) -> Variable:
     """The declaration of a tolerance of a quantity."""
     kind = "difference" if v.unit == "K" else ""
-    q = Quantity(v.unit, f"tolerance of: {v.description}", low=0.0, open_low=True, kind=kind)
-    return Variable(v.name, q.description, q)
+    text = f"tolerance of: {v.description}"
+    return plain_variable(v.name, v.unit, text, low=0.0, open_low=True, kind=kind)
 
 
 def _end(entry: Entry, name: str, variable: Variable) -> float:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Literal
 
-from pydantic import Field
-
 from ...drives.line_table import Damping
+from ...reading.tables import file_key
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.conditions import given
@@ -26,13 +25,11 @@ class TorsionCapability(Capability):
         "torsion": FileSection(
             TorsionTable,
             keys={
-                "joint": (
-                    Literal[*JOINTS],
-                    Field("alpha1", description="bend that the map of stability varies"),
-                ),
-                "damping_ratios": (
+                "joint": file_key(Literal[*JOINTS], "alpha1", "bend that the map of stability varies"),
+                "damping_ratios": file_key(
                     numbers(Damping, "damping_ratio", "torsion.damping_ratios", 4),
-                    Field([], description="damping ratios of the map"),
+                    [],
+                    "damping ratios of the map",
                 ),
             },
             title="Torsion of the driveline",

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,6 @@ from ...drives.torsion import (
     steady,
 )
 from ...study.analysis import Analysis, Work
-from ...study.drive import Drive
 from ...study.line.shaft import two_masses
 from ...study.record import StudyRecord
 from ...study.remark import note
@@ -83,11 +81,7 @@ class TorsionAnalysis(Analysis):
     has the table [torsion]."""
 
     name = "torsion"
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the driveline turns, so that its torsion is analysed."""
-        return drive.line.part("driveline") is not None
+    applies = staticmethod(lambda drive, plans: drive.line.part("driveline") is not None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TorsionFindings | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity, whole_number
 
 
 @declaration
@@ -18,24 +18,17 @@ class TorsionTable:
     fastest: Value = quantity(
         "1", "largest speed, in parts of that of normal running", default=2.0, above=0.0, max=1e3
     )
-    points: Value = quantity(
-        "1", "number of speeds of the resonance curve", default=200, min=10, max=5000, type="Integer"
-    )
-    margin: Value = quantity(
-        "1",
-        "permitted nearness to a resonance, as a share of the speed",
-        default=0.15,
-        min=0.0,
-        max=1.0,
-        kind="percent",
+    points: Value = whole_number("number of speeds of the resonance curve", default=200, min=10, max=5000)
+    margin: Value = percentage(
+        "permitted nearness to a resonance, as a share of the speed", default=0.15, min=0.0, max=1.0
     )
     factor: Value = quantity(
         "1", "permitted ratio of the peak torque to that of the load alone", default=1.5, min=1.0, max=100.0
     )
     bend_low: Value = quantity("rad", "least bend of the map", default=0.0, min=0.0, max=1.5)
     bend_high: Value = quantity("rad", "largest bend of the map", default=0.7, min=0.0, max=1.5)
-    speeds: Value = quantity("1", "number of speeds of the map", default=64, min=2, max=1000, type="Integer")
-    bends: Value = quantity("1", "number of bends of the map", default=14, min=2, max=1000, type="Integer")
+    speeds: Value = whole_number("number of speeds of the map", default=64, min=2, max=1000)
+    bends: Value = whole_number("number of bends of the map", default=14, min=2, max=1000)
 
 
 JOINTS = {

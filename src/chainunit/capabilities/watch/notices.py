@@ -13,7 +13,6 @@ from ...machines.chain_unit import SIDES
 from ...reading.results import derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import Dataset, peak
-from ...study.drive import Drive
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord, StudyRuns
 from ...study.remark import note, warning
@@ -124,11 +123,7 @@ class ObserverAnalysis(Analysis):
 
     name = "observer"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the study has an observer."""
-        return drive.observer is not None
+    applies = staticmethod(lambda drive, plans: drive.observer is not None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ObserverFindings | None:

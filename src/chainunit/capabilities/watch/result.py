@@ -120,46 +120,42 @@ class WatchSummary:
 
 
 def summary_of(watched: WatchedRecording) -> WatchSummary:
-    """All results of a watched recording, with texts in the units of the study."""
-    with shown_in(watched.config.units):
-        return _summary(watched)
-
-
-def _summary(watched: WatchedRecording) -> WatchSummary:
-    """The summary of a watched recording; its rows are `settled` after the time of learning."""
+    """All results of a watched recording, with texts in the units of the study; its rows are `settled` after the time
+    of learning."""
     plan, recording, begin = watched.plan, watched.recording, watched.begin
     settled = recording.time > float(recording.time[0]) + plan.table.learning
     loads = {load.name for load in begin.problem.sought}
     columns = *columns_watched(recording).values(), speed_column(recording)
-    return WatchSummary(
-        watched=watched,
-        heading=Heading.of(watched.config.title, watched.config.file),
-        recording=WatchedFile.from_recording(watched),
-        learned={
-            _file_name(unknown.name): fitted
-            for unknown, fitted in fitted_values(begin.problem, begin.fit)
-            # without the orders of a motion
-            if ".order." not in unknown.name
-        },
-        is_described=begin.is_described,
-        residuals=begin.tests,
-        doubts=list(_doubts(begin)),
-        of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
-        alarms=watched.alarms,
-        thresholds=Thresholds.from_recording(watched, settled),
-        noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
-        constant_parts=list(constant_parts(recording, [name for name in columns if name])),
-        gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],
-        failed_identification=watched.failed,
-        identification=None if plan.identification is None else str(plan.identification),
-        tuning={
-            v.name: InUnit(watched.parameters.get(v.name, v.quantity.start), v.unit, v.kind)
-            for v in LoadObserver.parameter_layout.variables
-            if v.name.split(".")[0] in ("noise", "feed", "force", "offset", "imbalance", "alarm")
-        },
-        usual=dict(_usual(watched, settled)),
-        course=_course(watched),
-    )
+    with shown_in(watched.config.units):
+        return WatchSummary(
+            watched=watched,
+            heading=Heading.of(watched.config.title, watched.config.file),
+            recording=WatchedFile.from_recording(watched),
+            learned={
+                _file_name(unknown.name): fitted
+                for unknown, fitted in fitted_values(begin.problem, begin.fit)
+                # without the orders of a motion
+                if ".order." not in unknown.name
+            },
+            is_described=begin.is_described,
+            residuals=begin.tests,
+            doubts=list(_doubts(begin)),
+            of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
+            alarms=watched.alarms,
+            thresholds=Thresholds.from_recording(watched, settled),
+            noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
+            constant_parts=list(constant_parts(recording, [name for name in columns if name])),
+            gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],
+            failed_identification=watched.failed,
+            identification=None if plan.identification is None else str(plan.identification),
+            tuning={
+                v.name: InUnit(watched.parameters.get(v.name, v.quantity.start), v.unit, v.kind)
+                for v in LoadObserver.parameter_layout.variables
+                if v.name.split(".")[0] in ("noise", "feed", "force", "offset", "imbalance", "alarm")
+            },
+            usual=dict(_usual(watched, settled)),
+            course=_course(watched),
+        )
 
 
 def _course(watched: WatchedRecording) -> dict[str, InUnit]:

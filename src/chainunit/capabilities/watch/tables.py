@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...reading.lists import Entry
-from ...reading.tables import given_values
+from ...reading.tables import file_key, given_values
 from ...recordings.table import (
     COLUMNS,
     FILE,
@@ -27,53 +25,43 @@ from ...study.config import FileReading
 class ObserverTable:
     """A load observer beside the motor."""
 
-    signal_noise: Value = quantity(
-        "1",
+    signal_noise: Value = percentage(
         "noise of the measured current or power: standard deviation in parts of the RMS torque of normal running",
         default=0.01,
         min=1e-5,
         max=1.0,
-        kind="percent",
     )
-    speed_noise: Value = quantity(
-        "1",
+    speed_noise: Value = percentage(
         "noise of the measured speed: standard deviation in parts of the speed of normal running",
         default=0.01,
         min=1e-5,
         max=1.0,
-        kind="percent",
     )
     rate: Value = quantity("Hz", "rate of independent samples", default=1000.0, min=1.0, max=1e6)
-    fluctuation: Value = quantity(
-        "1",
+    fluctuation: Value = percentage(
         "natural fluctuation of the feed of a side: standard deviation as a share",
         default=0.03,
         min=0.0,
         max=1.0,
-        kind="percent",
     )
     fluctuation_time: Value = quantity(
         "s", "correlation time of this fluctuation", default=10.0, min=0.01, max=1e6
     )
-    change: Value = quantity(
-        "1",
+    change: Value = percentage(
         "change of the feed that is followed: standard deviation in a second, in parts of the feed of a side; larger "
         "finds a shift earlier, smaller finds a smaller shift",
         default=0.1,
         min=1e-4,
         max=10.0,
-        kind="percent",
     )
     false_alarms: Value = quantity(
         "1", "permitted false alarms in a million turns", default=1.0, min=1e-6, max=1e5
     )
-    overload: Value = quantity(
-        "1",
+    overload: Value = percentage(
         "share of the feed of a side that, moved to the other side, overloads that side",
         default=0.2,
         min=1e-3,
         max=1.0,
-        kind="percent",
     )
     force_overload: Value = quantity(
         "N",
@@ -108,37 +96,29 @@ class WatchTable(RecordingTable):
         above=0.0,
         max=1e5,
     )
-    feed_deviation: Value = quantity(
-        "1",
+    feed_deviation: Value = percentage(
         "standard deviation of the study's feed from that at the begin, as a share",
         default=0.05,
         above=0.0,
         max=1.0,
-        kind="percent",
     )
-    noise: Value = quantity(
-        "1",
+    noise: Value = percentage(
         "standard deviation of the noise of a sensor, in parts of the RMS of its column",
         default=0.01,
         min=1e-6,
         max=1.0,
-        kind="percent",
     )
-    gain: Value = quantity(
-        "1", "standard deviation of the gain of a sensor", default=0.01, min=0.0, max=1.0, kind="percent"
-    )
+    gain: Value = percentage("standard deviation of the gain of a sensor", default=0.01, min=0.0, max=1.0)
 
 
 KEYS: Mapping[str, Any] = {
     "file": FILE,
     "columns": COLUMNS,
-    "identification": (
+    "identification": file_key(
         str,
-        Field(
-            "",
-            description="result.json of chainunit identify, whose covariance widens the thresholds; relative to the "
-            "study file",
-        ),
+        "",
+        "result.json of chainunit identify, whose covariance widens the thresholds; relative to the "
+        "study file",
     ),
 }
 """Keys of the table that are no quantities."""

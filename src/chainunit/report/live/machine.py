@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from ...core.printing.javascript import program
-from ...core.quantities import Quantity, Variable
+from ...core.quantities import plain_variable
 from ...machines.machine import Machine
 from ...reading.text import DEFAULT_UNITS, Units
 from ..blocks import LiveMachine
@@ -46,8 +46,9 @@ def of_linkage(machine: Machine, speed: float, file: str) -> LiveMachine:
     model = machine.model
     speed_quantity = speed_of_crank(speed)
     if model.slides:
-        q = Quantity("m/s", "speed of the driver", low=0.0, high=1e3, open_low=True)
-        speed_quantity = replace(speed_quantity, variable=Variable("crank_speed", "speed of the driver", q))
+        bounds = {"low": 0.0, "high": 1e3, "open_low": True}
+        variable = plain_variable("crank_speed", "m/s", "speed of the driver", **bounds)
+        speed_quantity = replace(speed_quantity, variable=variable)
     chosen = [*of_machine("feed", model.Feed()), speed_quantity, *of_machine("machine", machine.p)]
     copied = None
     if model.turns and not model.slides:

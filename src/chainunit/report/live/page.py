@@ -22,7 +22,7 @@ from .study import of_study, without_drive
 def live_of_config(config: Config, folder: Path) -> b.LiveMachine:
     """The live machine of a study before any run; a drive that a capability has to choose is not known."""
     if config.motor is None:
-        return without_drive(config, "the study chooses the motor; a run of the study makes the page with it")
+        return without_drive(config)
     choice = choose(config, folder)
     return of_study(config, choice.drive, choice.tables, choice.proposal)
 

@@ -72,8 +72,9 @@ def of_study(
     return replace(live, data={**live.data, "verdict": judged, "organs": stand_in(drive)})
 
 
-def without_drive(config: Config, why: str) -> LiveMachine:
-    """The live machine of a study whose drive is not known, with the reason in words."""
+def without_drive(config: Config) -> LiveMachine:
+    """The live machine of a study whose drive is not known, as a capability has to choose it."""
+    why = "the study chooses the motor; a run of the study makes the page with it"
     machine, speed = config.machine, float(config.run.crank_speed)
     chosen = [*of_machine("feed", config.feed), speed_of_crank(speed), *of_machine("machine", machine.p)]
     turn = live_turn(machine, speed, config.units)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...drives.belt import belt_drive
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import KINDS
@@ -20,7 +20,6 @@ from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
 from ..conditions import given, is_one_of
-from ..drive import Drive
 from ..event import Role
 from ..file_section import FileSection
 from ..record import StudyRecord
@@ -103,8 +102,8 @@ class BeltAnswers:
     """The load of the belt in a run. It slips through from 5 times the rated slip on."""
 
     force_peak: Value = quantity("N", "force of the belt, peak")
-    grip_largest: Value = quantity("1", "largest force over the grip", kind="percent")
-    slip_mean: Value = quantity("1", "slip, mean", kind="percent")
+    grip_largest: Value = percentage("largest force over the grip")
+    slip_mean: Value = percentage("slip, mean")
     slipping_time: Value = quantity("s", "time in which it slips through")
     tight_strand_peak: Value = quantity("N", "tight strand, peak")
     shaft_force_mean: Value = quantity("N", "radial force on either shaft, mean")
@@ -117,9 +116,9 @@ class BeltAnswers:
 class BeltLoad:
     """The belt at a constant load and the rated speed."""
 
-    load: float = quantity("1", "load over the rated torque", kind="percent")
-    slip: float = quantity("1", "slip", kind="percent")
-    efficiency: float = quantity("1", "efficiency", kind="percent")
+    load: float = percentage("load over the rated torque")
+    slip: float = percentage("slip")
+    efficiency: float = percentage("efficiency")
 
 
 @result
@@ -195,11 +194,7 @@ class BeltAnalysis(Analysis):
 
     name = "belt_slip"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the drive has one."""
-        return drive.line.part(BeltPlan.name) is not None
+    applies = staticmethod(lambda drive, plans: drive.line.part(BeltPlan.name) is not None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> BeltFindings:

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from ...core.errors import refusal_prefix
 from ...core.quantities import Layout, Value, declaration, quantity
@@ -17,6 +16,7 @@ from ...drives.driveline import CardanDriveline, Mounted
 from ...drives.line_table import CORNER, SHAFTS, Damping, form, line_values
 from ...drives.shafts import SECTIONS as PROFILES
 from ...drives.shafts import Shaft
+from ...reading.tables import file_key
 from ..analysis import Analysis
 from ..conditions import Schema, is_one_of
 from ..config import FileReading
@@ -96,7 +96,7 @@ class DrivelinePart(PartOfLine):
         "driveline": FileSection(
             Driveline,
             optional=True,
-            keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
+            keys={"place": file_key(Literal[PLACES], "crank", "shaft that it is on")},
             form=TableForm(
                 form,
                 partial(line_values, prefix="driveline."),

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, percentage, quantity
 from ...drives.fluid_coupling import FluidCoupling, FluidCouplingData
 from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
-from ..drive import Drive
 from ..file_section import FileSection
 from ..readings import motor_pull_out
 from ..record import StudyRecord
@@ -69,9 +68,9 @@ class CouplingAnswers:
     all its heat stays in it."""
 
     torque_peak: Value = quantity("N.m", "torque at the motor's shaft, peak")
-    torque_share: Value = quantity("1", "the same over the rated torque", kind="percent")
-    slip_mean: Value = quantity("1", "slip, mean", kind="percent")
-    slip_largest: Value = quantity("1", "slip, largest", kind="percent")
+    torque_share: Value = percentage("the same over the rated torque")
+    slip_mean: Value = percentage("slip, mean")
+    slip_largest: Value = percentage("slip, largest")
     loss_mean: Value = quantity("W", "power turned into heat, mean")
     heat: Value = quantity("J", "heat")
     plug_time: Value = quantity("s", "fusible plug melts after, at the earliest")
@@ -82,7 +81,7 @@ class CouplingFindings(Findings):
     """By run, the load of the fluid coupling; and its rated and its stall torque."""
 
     rated_torque: float = quantity("N.m", "rated torque")
-    rated_slip: float = quantity("1", "rated slip", kind="percent")
+    rated_slip: float = percentage("rated slip")
     stall_torque: float = quantity("N.m", "torque in a stall with the motor at its rated speed")
     motor_torque: float | None = quantity("N.m", "pull-out torque of the motor, at its shaft")
     answers: Mapping[str, CouplingAnswers] = part("load of the fluid coupling, by run", default_factory=dict)
@@ -143,11 +142,7 @@ class CouplingAnalysis(Analysis):
 
     name = "coupling_slip"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the drive has one."""
-        return drive.line.part(FluidCouplingPlan.name) is not None
+    applies = staticmethod(lambda drive, plans: drive.line.part(FluidCouplingPlan.name) is not None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> CouplingFindings:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work, is_examined
 from ..arrays import Dataset
-from ..drive import Drive
 from ..record import StudyFindings, StudyRecord, StudyRuns
 from ..remark import note, warning
 from .rigid_line import HOLDS_FROM, RigidLine
@@ -45,11 +43,7 @@ class ShaftAnalysis(Analysis):
 
     name = "shaft"
     needs_runs = True
-
-    @staticmethod
-    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
-        """Whether the drive has a driveline."""
-        return drive.line.part("driveline") is not None
+    applies = staticmethod(lambda drive, plans: drive.line.part("driveline") is not None)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ShaftFindings:
