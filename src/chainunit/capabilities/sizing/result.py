@@ -318,7 +318,8 @@ def _effects(runs: StudyRuns, effects: Mapping[str, CouplingEffect]) -> dict[str
     for name, effect in effects.items():
         title = f"{runs.title_of(name)}: peak at the output of the gear"
         data[name] = {
-            key: _torque(getattr(effect, key), f"{title}, {words}") for key, words in titles.items()
+            key: _torque(getattr(effect, key), f"{title}, {effect_title}")
+            for key, effect_title in titles.items()
         }
     return data
 
