@@ -391,21 +391,21 @@ def test_sizing_takes_the_line_into_its_trials(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "factor"),
+    ("text", "factor", "gentle"),
     [
-        ("load_class = 'very heavy'", 1.6),
-        ("load_class = 'very heavy'\nhours = 8", 1.5),
-        ("service_factor = 2", 2.0),
-        # heavy by the inertia of the mill for so small a motor
-        ("", 1.5),
+        ("load_class = 'very heavy'", 1.6, 1.4),
+        ("load_class = 'very heavy'\nhours = 8", 1.5, 1.3),
+        ("service_factor = 2", 2.0, 2.0),
+        # moderate by the inertia of the mill, 1.8 times that of the motor
+        ("", 1.3, 1.2),
     ],
 )
-def test_sizing_tensions_a_belt_as_it_orders_one(text, factor, tmp_path):
+def test_sizing_tensions_a_belt_as_it_orders_one(text, factor, gentle, tmp_path):
     """The factor of DIN 7753-2; a gentle start has less, and a factor in the file of the belt is kept."""
     motor = motor_of_catalogue(MOTOR)
     for start, belt, wanted in (
         ("direct", "", factor),
-        ("soft", "", factor if "service" in text else factor - 0.2),
+        ("soft", "", gentle),
         ("direct", "service_factor = 1.4", 1.4),
     ):
         config = parse(f"event = []\nstart = '{start}'\n[belt]\nratio = 3\n{belt}\n[sizing]\n{text}\n")

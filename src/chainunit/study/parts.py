@@ -164,7 +164,9 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     with faults.collected():
         machine, unusual = _machine_model(table, source)
     faults.refuse()
-    machine, wrong = _with_further(machine, [name for name, _ in entries(named_table(data, "machine"))])
+    # one that is no table is refused with the other tables
+    parameters = data.get("machine") if isinstance(data.get("machine"), Mapping) else {}
+    machine, wrong = _with_further(machine, [name for name, _ in entries(parameters)])
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")

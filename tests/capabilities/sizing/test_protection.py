@@ -284,7 +284,7 @@ def test_the_torques_of_a_cold_and_of_a_warm_motor_have_their_names():
     cold, warm = (model.largest_torque(p, T, p.supply.V, 50.0) for T in (313.15, 393.15))
     assert cold > 1.01 * warm
     titles = {field.name: str(field.metadata) for field in dataclasses.fields(DriveProtection)}
-    assert "warm motor" in titles["breakdown_torque"] and "cold motor" in titles["start_torque"]
+    assert "as warm as in running" in titles["breakdown_torque"] and "cold motor" in titles["start_torque"]
 
 
 @pytest.mark.parametrize(

@@ -354,7 +354,7 @@ def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp
     # nor may a motor give the gear more at its rating than it carries, though its start be gentle
     for c in outcome.candidates:
         check, gear = c.checks["gear_service"], c.drive
-        rated = c.motor.nameplate.torque * gear.ratio / (1.0 + gear.gear_loss)
+        rated = c.motor.nameplate.torque * gear.ratio / (1.0 + gear.gear.loss)
         assert check.value == pytest.approx(rated, rel=1e-9) and check.limit == 150.0
     assert "4 of 4 were tried" in outcome.answer
     result = as_data(outcome)
