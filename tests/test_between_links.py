@@ -128,8 +128,38 @@ def test_a_sharp_machine_is_followed_in_small_steps():
         want = other.solution(x, np.array([q]), np.zeros(1), np.zeros(1))
         for key in ("tau", "O.fx", "P.fy", "C.fx"):
             assert out[key][k] == pytest.approx(want[key], abs=1e-9 * np.max(np.abs(out[key]))), (key, q)
-    with pytest.raises(InputError, match="moves too sharply"):
+    with pytest.raises(
+        InputError, match=r"close at its start, 0 deg of .*, or correct the places in \[start\]"
+    ):
         linkage_from(toml(texts.STEPHENSON.replace("A = [0.1, 0]", "A = [0.37, 0]")), "machine")
+
+
+def test_a_range_that_a_tetrad_does_not_close_over():
+    """It closes up to 46 degrees: the refusal says to take a smaller range, which works."""
+    text = """
+[ground]
+O = [0, 0]
+G = [1.2, 0.1]
+[driver]
+link = "crank"
+range = ["20 deg", "80 deg"]
+[links.crank]
+points = { O = [0, 0], A = [0.15, 0] }
+[links.first]
+points = { A = [0, 0], U = [0.2, 0.15], V = [0.3, -0.1] }
+[links.second]
+points = { G = [0, 0], M = [-0.3, 0.25], N = [-0.35, -0.1] }
+[links.upper]
+points = { U = [0, 0], M = [0.626046, 0] }
+[links.lower]
+points = { V = [0, 0], N = [0.435238, 0] }
+[start]
+phi = "40 deg"
+angles = { first = "10 deg", second = 0, upper = 0, lower = 0 }
+"""
+    with pytest.raises(InputError, match=r"over the range of the driver, or .* take a smaller range"):
+        linkage_from(toml(text), "machine")
+    linkage_from(toml(text.replace("80 deg", "44 deg")), "machine")
 
 
 @pytest.mark.parametrize("name", [*TETRADS, "motor between crank and coupler", "exciter on a coupler"])

@@ -192,6 +192,12 @@ class FollowedGroup(Group):
     def _corrected(self, xp: Any, placed: Any, near: Sequence[Any], steps: int) -> tuple[Any, ...]:
         return corrected(lambda x: self.legs_at(xp, placed, x), near, steps)
 
+    def misfit_at_start(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> float:
+        """The largest misfit of a leg at the start."""
+        placed = self.at_position(before(self.start))
+        legs = self.legs_at(xp, placed, self._corrected(xp, placed, self.assembly, 8))
+        return max(float(leg.misfit(xp)) for leg in legs)
+
     def _followed(
         self, xp: Any, before: Callable[[float], LinkageInMotion], angles: Sequence[float]
     ) -> list[tuple[Any, ...]]:

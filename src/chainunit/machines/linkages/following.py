@@ -195,9 +195,14 @@ class FollowedLinkage:
                 raise self._open_group(k, self.way.start)
             bars, legs = group.bars, len(group.legs)
             links = ", ".join(bar.name for bar in (*bars[legs:], *bars[:legs]))
+            sharp = ", or moves too sharply to be followed"
+            way = (f"all the way round{sharp}", "let the driver swing by a range")
+            if self.way.swings:
+                way = (f"over the range of the driver{sharp}", "take a smaller range")
+            if group.misfit_at_start(MATH, self._before(k)) > MOST_MISFIT:
+                way = (f"at its start, {self.way.words(self.way.start)}", "correct the places in [start]")
             raise InputError(
-                f"the {group.kind} of {links} does not close all the way round, or moves too sharply to be "
-                "followed: change its lengths",
+                f"the {group.kind} of {links} does not close {way[0]}: change its lengths, or {way[1]}",
                 key=f"links.{group.name}",
             )
 

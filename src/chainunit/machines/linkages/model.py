@@ -546,21 +546,11 @@ class LinkageDescription(LinkageOutputs):
             for entry in self.further.varying(self.way.turns)
         )
         belts = (
-            Requirement(
-                f"distance of the centres of the pulleys of the belt {belt}",
-                "m",
-                "the pulleys overlap",
-                names,
-            )
+            Requirement(f"distance of the centres of the belt {belt}", "m", "the pulleys overlap", names)
             for belt in self.structure.belts
         )
-        return (
-            *margins,
-            *fits,
-            *laws,
-            *belts,
-            *(requirement_of_width(*width, names) for width in self.widths),
-        )
+        widths = (requirement_of_width(*width, names) for width in self.widths)
+        return (*margins, *fits, *laws, *belts, *widths)
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad or
