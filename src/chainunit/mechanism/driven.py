@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ..core.engines import Dual, dual, slope
 from ..groups.driver import Course
 from ..groups.loads import Effect
-from .linkage import Linkage, Topology
+from .linkage import Linkage
 from .machine import InMotion, MachineState, Mechanism, Steadiness
 
 Free = Mapping[int, tuple[Any, Any, Any]]
@@ -45,27 +45,21 @@ def motions_of(xp: Any, linkage: Linkage, q: Any, w: Any, free: Free) -> list[Dr
 
 
 class DrivenLinkage:
-    """A linkage whose drivers have these `motions`: `inertia` has the effort of each driver per acceleration of each
+    """A linkage with the `motions` of its drivers: `inertia` has the effort of each driver per acceleration of each
     [kg m2, kg m, kg], `bias` the efforts at a constant speed of the first one and of the ones that move by
     themselves [N m, N], of which `friction` is a part; `effects` are the effects of the loads."""
 
     __slots__ = ("_moved", "_reactions", "alone", "bias", "effects", "friction", "inertia", "motions")
 
-    def __init__(
-        self,
-        xp: Any,
-        linkage: Linkage,
-        motions: Sequence[DriverMotion],
-        derived: Sequence[Any] = (),
-        topology: Topology | None = None,
-    ) -> None:
+    def __init__(self, xp: Any, mechanism: Mechanism, q: Any, w: Any, free: Free) -> None:
         """
         Parameters
         ----------
         xp : engine (see `chainunit.core.engines`)
-        derived : numbers that the groups derive from the lengths
+        mechanism : with this linkage; `q`, `w` and `free` are the motion of its drivers, see `motions_of`
         """
-        self.motions = motions
+        linkage, derived, topology = mechanism.linkage, mechanism.derived, mechanism.topology
+        motions = self.motions = motions_of(xp, linkage, q, w, free)
 
         def moved(rates: Sequence[tuple[Any, Any, Any]]) -> Mechanism:
             courses = [Course(motion.place, rate) for motion, rate in zip(motions, rates, strict=True)]
@@ -140,11 +134,6 @@ class DrivenLinkage:
         return inertia, bias
 
 
-def driven_from(xp: Any, m: Mechanism, q: Any, w: Any, free: Free) -> DrivenLinkage:
-    """The linkage of a mechanism whose first driver has the place `q` and the speed `w`."""
-    return DrivenLinkage(xp, m.linkage, motions_of(xp, m.linkage, q, w, free), m.derived, m.topology)
-
-
 class StateOfDrivers(MachineState):
     """A linkage at one place and speed of its first driver, of which further drivers have motors of their own:
     inertia and torque are what the first one gives; energies and losses belong to the whole machine."""
@@ -159,7 +148,7 @@ class StateOfDrivers(MachineState):
         """
         super().__init__(xp, m, w)
         self._geared, self._free = geared, free
-        self.driven = driven_from(xp, m, m.q, w, free)
+        self.driven = DrivenLinkage(xp, m, m.q, w, free)
         self.J, self.bias = self.driven.port(0, geared)
 
     def port_slope(self, number: int, a: Any = 0.0, by_speed: bool = False) -> tuple[Any, Any]:
@@ -172,7 +161,7 @@ class StateOfDrivers(MachineState):
             free[number] = *seeded, free[number][2]
         else:
             q, w = seeded
-        driven = driven_from(dual(self._xp), self.m, q, w, free)
+        driven = DrivenLinkage(dual(self._xp), self.m, q, w, free)
         inertia, bias = driven.port(number, self._geared, a)
         return slope(inertia), slope(bias)
 

@@ -17,7 +17,7 @@ from ...core.ports import further_terminals, way_terminals
 from ...core.quantities import Value, declared_class, fields_of, group, quantity
 from ...groups.driver import Course
 from ...mechanism.curves import TableCurve
-from ...mechanism.driven import Free, StateOfDrivers, driven_from
+from ...mechanism.driven import DrivenLinkage, Free, StateOfDrivers
 from ...mechanism.driver_ports import ROTATING, SLIDING, DriverPort
 from ...mechanism.expressions import LawCourse, expression, held
 from ...mechanism.machine import MachineState
@@ -147,7 +147,7 @@ class FurtherDrivers:
         """The outputs of all drivers in a state of the linkage, at the acceleration `a` of the first one."""
         if not self.entries:
             return {}
-        driven = s.driven if isinstance(s, StateOfDrivers) else driven_from(xp, s.m, s.m.q, s.w, {})
+        driven = s.driven if isinstance(s, StateOfDrivers) else DrivenLinkage(xp, s.m, s.m.q, s.w, {})
         values = {}
         efforts, accelerations = driven.efforts(a), driven.accelerations(a)
         for k, entry in enumerate(self.entries, 1):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 from ...core.planar import Vec2, rotated
@@ -34,7 +33,7 @@ class LinkageParts:
         self,
         geometry: LinkGeometry,
         sides: Mapping[str, Any],
-        courses: Mapping[str, Callable[[Any, Any], Course]] = MappingProxyType({}),
+        courses: Mapping[str, Callable[[Any, Any], Course]],
     ) -> None:
         """
         Parameters
