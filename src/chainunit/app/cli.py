@@ -266,18 +266,13 @@ def keys(
     from ..report import reference, terminal
 
     if schema:
-        _write_schema()
+        from ..core.files import write_file
+        from ..study.schema import FILE, json_schema
+
+        write_file(Path(FILE), json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n")
+        print(f"{FILE}: schema of study files")
         return
     terminal.show(reference.keys_of(table) if table else reference.overview(), terminal_console())
-
-
-def _write_schema() -> None:
-    """Write the JSON Schema of study files."""
-    from ..core.files import write_file
-    from ..study.schema import FILE, json_schema
-
-    write_file(Path(FILE), json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n")
-    print(f"{FILE}: schema of study files")
 
 
 @app.command("linkage")

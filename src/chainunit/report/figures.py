@@ -165,12 +165,13 @@ def _load_histogram(study: StudyRecord) -> fig.Figure:
     panels = []
     for name, torque in torques.items():
         edges, shares = histogram(steady["time"].values, torque)
-        values = tuple(_averages(steady, torque))
+        average = fig.Mark(mean(steady, torque), "mean", look="mark")
+        rms = fig.Mark(math.sqrt(mean(steady, torque**2)), "RMS", look="reference")
         bars = fig.Between(
             "", np.repeat(edges, 2)[1:-1], np.zeros(2 * len(shares)), np.repeat(shares, 2), "band"
         )
         y = fig.Axis("share of the time", "1", "percent", low=0.0, high=1.08 * float(np.max(shares)))
-        panels.append(fig.Panel(fig.Axis(name, "N.m"), y, (bars, *values)))
+        panels.append(fig.Panel(fig.Axis(name, "N.m"), y, (bars, average, rms)))
     return fig.Figure(
         "load-histogram",
         "Histogram of the load in steady running",
@@ -189,11 +190,6 @@ def histogram(time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndar
     wide = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     counts, edges = np.histogram(middle, _LOAD_CLASSES, (low, low + wide), weights=spans)
     return edges, counts / np.sum(counts)
-
-
-def _averages(steady: Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
-    yield fig.Mark(mean(steady, torque), "mean", look="mark")
-    yield fig.Mark(math.sqrt(mean(steady, torque**2)), "RMS", look="reference")
 
 
 @PICTURES.declare(

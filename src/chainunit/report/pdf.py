@@ -104,7 +104,11 @@ class _PrintedPage(Page):
         rows = tuple(row for row in table.rows if row.form != "long")
         table = replace(table, rows=rows or table.rows).of_form("long")
         if sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) > _BARS:
-            table = replace(table, rows=tuple(map(_without_bars, table.rows)))
+            cells = (
+                [x.utilisation if isinstance(x, b.Share) else x for x in row.cells] for row in table.rows
+            )
+            rows = tuple(replace(row, cells=tuple(x)) for row, x in zip(table.rows, cells, strict=True))
+            table = replace(table, rows=rows)
         return super()._table(table)
 
     def _height(self, figure: Any) -> float:
@@ -132,12 +136,6 @@ class _PrintedPage(Page):
 
 _FLAT = 0.5
 """Height over width below which two figures stand beside each other in a long annex."""
-
-
-def _without_bars(row: b.TableRow) -> b.TableRow:
-    return replace(
-        row, cells=tuple(cell.utilisation if isinstance(cell, b.Share) else cell for cell in row.cells)
-    )
 
 
 def check_library() -> None:

@@ -145,7 +145,10 @@ class ReportedResult(Generic[Question, Outcome]):
             elif place.resolve() != self._folder.resolve():
                 task.clear(place)
                 for file in task.kept(self._outcome, self._folder):
-                    _copy(file, place / file.relative_to(self._folder))
+                    target = place / file.relative_to(self._folder)
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    with atomic_file(target) as part:
+                        shutil.copyfile(file, part)
             return self._write(place, png)
 
     def _write(self, folder: Path, png: bool = False) -> list[Path]:
@@ -171,12 +174,6 @@ def _single_numbers(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple
                 yield prefix + name, below
         elif isinstance(below, Mapping):
             yield from _single_numbers(below, f"{prefix}{name}.")
-
-
-def _copy(file: Path, target: Path) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(target) as part:
-        shutil.copyfile(file, part)
 
 
 class ResultFigure:

@@ -166,7 +166,7 @@ def independent(further: Collection[InputError], faults: Collection[InputError])
         for key, decider in section.lists.deciders.items()
         if f"{table}.{decider}" in wrong
     }
-    lower = lower_limits()
+    lower = {high: low for low, _, high in _order()}
 
     def stands(key: str) -> bool:
         """Whether the refusal of a key depends on no refused value."""
@@ -185,11 +185,6 @@ def _order() -> tuple[tuple[str, str, str], ...]:
         for table, section in all_sections().items()
         for low, relation, high in section.order
     )
-
-
-def lower_limits() -> dict[str, str]:
-    """By the name of an upper limit, that of the lower one."""
-    return {high: low for low, _, high in _order()}
 
 
 def check_order(values: Mapping[str, Any]) -> Iterator[InputError]:

@@ -105,11 +105,6 @@ class KeyTable:
         return " ".join(filter(None, (self.bracketed, self.of and f"of {self.of}")))
 
     @property
-    def is_list(self) -> bool:
-        """Whether a file may have several tables of this name."""
-        return self.name == "event" or (self.name in entry_tables() and not self.is_named)
-
-    @property
     def is_named(self) -> bool:
         """Whether the file chooses the name of the table, which stands here as ``NAME``."""
         return self.name.endswith(f".{NAME}")
@@ -117,7 +112,7 @@ class KeyTable:
     @property
     def bracketed(self) -> str:
         """The line that opens the table: ``[motor]``."""
-        if self.is_list:
+        if self.name == "event" or (self.name in entry_tables() and not self.is_named):
             return f"[[{self.name}]]"
         return f"[{self.name}]" if self.name else "before all tables"
 

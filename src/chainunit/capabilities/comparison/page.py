@@ -119,7 +119,9 @@ def _runs(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
     for run, compared in comparison.runs.items():
         measures = compared.measures.items()
         different = [name for name, measure in measures if measure.a.value != measure.b.value]
-        short = {name for name in different if _is_short(run, name)}
+        # with little room the minor measures and the pins are left out
+        minor = {name for name, measure in MEASURES.items() if measure.minor}
+        short = set() if run.startswith("pins.") else {*different} - minor
         if not different:
             equal.append(compared.title)
         rows = []
@@ -131,12 +133,6 @@ def _runs(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
             yield b.Table(tuple(rows), heads, title=title, form="both" if short else "long")
     if equal:
         yield b.Text(f"Every number is the same in: {'; '.join(equal)}.")
-
-
-def _is_short(run: str, name: str) -> bool:
-    """Whether a measure that differs is shown where there is little room, too."""
-    measure = MEASURES.get(name)
-    return not run.startswith("pins.") and (measure is None or not measure.minor)
 
 
 TASK: Task[tuple[StoredResult, StoredResult], StudyComparison] = Task(

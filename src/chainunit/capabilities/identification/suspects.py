@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -211,7 +211,8 @@ class _Search:
                 self._fit_with(names, freed)
             fit_costs = self._costs()
             costs = {names: fit_costs.get(names, max(0.0, cost)) for names, cost in costs.items()}
-            best_sets = _smallest(names for names, cost in _sorted(costs) if cost < MARGIN)
+            good = [names for names, cost in _sorted(costs) if cost < MARGIN]
+            best_sets = [names for names in good if not any(other < names for other in good)]
         for names in best_sets[:MOST_SETS]:
             yield self._set(names, freed, costs[names])
 
@@ -310,12 +311,6 @@ class _Search:
 
 def _sorted(costs: Mapping[frozenset[str], float]) -> list[tuple[frozenset[str], float]]:
     return sorted(costs.items(), key=lambda item: item[1])
-
-
-def _smallest(sets: Iterable[frozenset[str]]) -> list[frozenset[str]]:
-    """The sets that have none of the others in them."""
-    listed = list(sets)
-    return [names for names in listed if not any(other < names for other in listed)]
 
 
 def _wider(problem: Problem, z: Any, more: Sequence[Unknown]) -> tuple[Problem, Any]:

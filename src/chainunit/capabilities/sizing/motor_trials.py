@@ -138,7 +138,11 @@ class MotorTrials:
             return [self.best_of(motor) if judge is None else judge(self.candidate(motor))]
         flywheel = partial(least_boost, judged=self.with_flywheel, is_given=self.has_given_boost)
         judge = judge or flywheel
-        needed = self.task.tables.gear.ratio if self.has_given_ratio else self._needed_ratio(motor)
+        plan, task, needed = self.plan, self.task, self.task.tables.gear.ratio
+        if not self.has_given_ratio:
+            # the ratio at which the crank has its speed
+            machine = task.tables, task.machine, self.duty.normal, motor, plan.demands.ambient
+            needed = catalogue_drive(*machine, offer=plan.offer).ratio
         tried = self._over_gears(motor, needed, judge)
         last = tried[-1]
         if last.drive.follows and not self.has_given_ratio and misses_by_a_hair(last):
@@ -147,14 +151,6 @@ class MotorTrials:
             more = [] if above is None else self._over_gears(motor, above, judge)
             tried += [c for c in more if c.gear not in gears]
         return tried
-
-    def _needed_ratio(self, motor: CatalogueMotor) -> float:
-        """The ratio at which the crank has its speed."""
-        plan, task = self.plan, self.task
-        drive = catalogue_drive(
-            task.tables, task.machine, self.duty.normal, motor, plan.demands.ambient, offer=plan.offer
-        )
-        return drive.ratio
 
     def _over_gears(
         self, motor: CatalogueMotor, ratio: float, judge: Callable[[Candidate], Candidate]

@@ -130,10 +130,14 @@ def _steps(
         _least, value=lambda c: math.inf if c.price is None else c.price
     )
     return (
-        (Criterion.MARGIN, _with_margin),
+        (Criterion.MARGIN, lambda left: [c for c in left if c.leaves_margin] or _less_used(left)),
         (Criterion.PRICE, cheapest) if objective == PRICE else (Criterion.LARGER, most),
         (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
-        (Criterion.GEAR, partial(_least, value=_second_unit)),
+        # a ratio may take two units, such as a belt before a gear
+        (
+            Criterion.GEAR,
+            partial(_least, value=lambda c: float(c.unit is None or c.unit.noun == "belt and gear")),
+        ),
         (Criterion.START, partial(_least, value=lambda c: c.trial.tolerant_class or 0)),
         (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.added_inertia > 0.0))),
         # the better number of poles may cost one step of power
@@ -145,19 +149,9 @@ def _steps(
     )
 
 
-def _second_unit(c: Candidate) -> float:
-    """1 for a ratio that takes two units, such as a belt before a gear; else 0."""
-    return float(c.unit is None or c.unit.noun == "belt and gear")
-
-
 def _least(left: list[Candidate], value: Callable[[Candidate], float]) -> list[Candidate]:
     least = min(map(value, left))
     return [c for c in left if value(c) == least]
-
-
-def _with_margin(left: list[Candidate]) -> list[Candidate]:
-    """The candidates that keep the margin; where none does, the candidates that use least of their limits."""
-    return [c for c in left if c.leaves_margin] or _less_used(left)
 
 
 def _powerful(left: list[Candidate], most: float) -> list[Candidate]:

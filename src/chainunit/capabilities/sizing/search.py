@@ -240,7 +240,8 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
         if len(tried) < demands.candidates:
             return False
         if objective == PRICE and following.price is not None:
-            return _is_cheapest(candidates, following.price + cheapest_gear)
+            prices = (c.price for c in candidates if c.keeps_margin and c.price is not None)
+            return min(prices, default=math.nan) <= following.price + cheapest_gear
         return _is_settled(candidates, following, demands.larger)
 
     def next_spared() -> CatalogueMotor | None:
@@ -452,12 +453,6 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
         if trials.is_made:
             end = f"even of makers with large ratios ends at about {unit.made:g}"
         yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {unit.title} {end}."
-
-
-def _is_cheapest(candidates: list[Candidate], price: float) -> bool:
-    """Whether a candidate keeps the margin at a price that no drive of this least `price` or more undercuts."""
-    prices = [c.price for c in candidates if c.keeps_margin and c.price is not None]
-    return bool(prices) and min(prices) <= price
 
 
 def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: float) -> bool:

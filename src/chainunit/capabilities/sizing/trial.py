@@ -294,8 +294,8 @@ class Trial:
         """Its results."""
         names = {entry.name for entry in dataclasses.fields(TrialResult)}
         # of a motor that does not start, the speed and the frequency mean nothing
-        reached = names if self.start_time is not None else names - {"speed", "frequency"}
-        return TrialResult(**{name: getattr(self, name) for name in reached})
+        shown = names if self.start_time is not None else names - {"speed", "frequency"}
+        return TrialResult(**{name: getattr(self, name) for name in shown})
 
     @property
     def checks(self) -> dict[str, Check]:

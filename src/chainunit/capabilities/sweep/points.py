@@ -133,12 +133,6 @@ class SweepTask:
             on_host=True,
         )
 
-    def codes_of_turns(self, table: Dataset) -> Any:
-        """The codes of the sweep for those of `turns`, shape (points,); `make_points` names a swept value that is
-        outside its bounds."""
-        code, count = table.reason.values, len(reasons_of(self.machine.model))
-        return np.where(code < count, code, self.codes[Beside.BOUNDS, ""]).astype(np.int16)
-
     def digest(self) -> str:
         """A digest of everything on which the results depend, in hexadecimal digits. The number of points of Sobol's
         sequence is not of it: such a sweep may grow."""
@@ -201,7 +195,8 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     plan = task.plan
     values = plan.values(begin, end)
     table = task.turns(values)
-    reason = task.codes_of_turns(table)
+    code, count = table.reason.values, len(reasons_of(task.machine.model))
+    reason = np.where(code < count, code, task.codes[Beside.BOUNDS, ""]).astype(np.int16)
     for parameter in plan.parameters:
         admitted = parameter.variable.quantity.admits(values[parameter.name])
         reason[~admitted] = task.codes[ReasonKind.BOUNDS, parameter.name]

@@ -22,7 +22,6 @@ from ...study.start_up import LONGEST_RISE, PATIENCE, RISES
 from ...study.window import CLOSED, DRIFT
 from ...system.certificate import torque_names
 from ...system.compiled_simulation import LONGEST, CompiledSystem
-from ...system.signals import Profile
 from .formulas import event_signals
 from .quantities import LiveQuantity, shown_in_unit
 
@@ -109,7 +108,10 @@ def live_runs(
         "reference": "motor.w_ref" if drive.follows else None,
         "droop_speed": drive.droop_speed,
         "ramp": float(run.ramp),
-        "switching": {full: _profile(x) for full, x in drive.star.signals().items()},
+        "switching": {
+            full: {"start": float(x.start), "changes": [list(map(float, change)) for change in x.changes]}
+            for full, x in drive.star.signals().items()
+        },
         "switched_until": drive.star.end,
         "starter_time": operation.starter_time,
         "settle_turns": float(run.settle_turns),
@@ -140,10 +142,6 @@ def live_runs(
     }
     names = {*model.parameter_layout.names, *system.inputs}
     return LiveRuns(equations, data, names, tuple(_quantities(drive, operation, taken, names)))
-
-
-def _profile(signal: Profile) -> dict[str, Any]:
-    return {"start": float(signal.start), "changes": [list(map(float, change)) for change in signal.changes]}
 
 
 def _event(rig: Rig, event: Event) -> dict[str, Any]:

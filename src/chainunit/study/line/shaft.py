@@ -113,13 +113,6 @@ def rainflow(torque: Any) -> Cycles:
     return Cycles(rows[:, 0], rows[:, 1], rows[:, 2])
 
 
-def from_peak(torque: Any) -> Any:
-    """A periodic torque, shifted so that it begins and ends at its largest value. Then no cycle stays open,
-    whatever the phase of the window."""
-    first = int(np.argmax(torque))
-    return np.concatenate([torque[first:], torque[: first + 1]])
-
-
 def driveline_of(drive: Drive) -> Parameters:
     """The driveline of a drive that has one."""
     part = drive.line.part("driveline")
@@ -190,7 +183,10 @@ def shaft_answers(
     tau2 = run["driveline.tau2"].values
     peak2, peak_rigid = peak(tau2), peak(rigid_torque(drive, rigid))
     steady = steady_damage_per_turn is None
-    cycles = rainflow(from_peak(tau2) if steady else tau2).above(ROUNDING * peak2)
+    # a periodic torque that begins and ends at its largest value has no open cycle
+    first = int(np.argmax(tau2))
+    closed = np.concatenate([tau2[first:], tau2[: first + 1]])
+    cycles = rainflow(closed if steady else tau2).above(ROUNDING * peak2)
     turns = max(turns_made(drive, run), 1e-9)
     damage = cycles.damage(exponent)
     twist = run["driveline.twist2"].values + run["driveline.twist3"].values
