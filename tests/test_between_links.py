@@ -377,7 +377,7 @@ def refused(text, *changes):
 def test_refusals_of_tetrads():
     text = texts.STEPHENSON
     open_tetrad = (
-        "links.one: the tetrad of one, two, upper, lower does not close all the way round, or moves too"
+        "links.one: the tetrad of one, two, upper, lower does not close at its start, 0 deg of crank"
     )
     for changes, words in (
         ([("A = [0.1, 0]", "A = [0.5, 0]")], open_tetrad),

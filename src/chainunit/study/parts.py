@@ -165,8 +165,9 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
         machine, unusual = _machine_model(table, source)
     faults.refuse()
     # one that is no table is refused with the other tables
-    parameters = data.get("machine") if isinstance(data.get("machine"), Mapping) else {}
-    machine, wrong = _with_further(machine, [name for name, _ in entries(parameters)])
+    parameters = data.get("machine")
+    names = [name for name, _ in entries(parameters)] if isinstance(parameters, Mapping) else []
+    machine, wrong = _with_further(machine, names)
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
