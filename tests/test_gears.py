@@ -689,7 +689,7 @@ def test_the_pitch_line_stays_on_its_side_of_the_pinion(pitch_radius):
 
 
 @pytest.mark.parametrize("make", [None, *(["native"] if compiler() else []), "python"])
-def test_parameters_that_bring_pulleys_together(make, tmp_path):
+def test_parameters_that_bring_pulleys_together(make, tmp_path, capsys):
     """They are refused as the pulleys of a file are, in Python and by FMUs."""
     data = belted(five_bar, mesh=([0.1, 0.2], False))
     del data["links"]["left"], data["links"]["right"]
@@ -708,17 +708,16 @@ def test_parameters_that_bring_pulleys_together(make, tmp_path):
                 machine.replace({"c": c})
         return
     file = (export if make == "native" else export_python)(machine.model, tmp_path / "belt.fmu")
-    logged: list[str] = []
+    # fmpy prints the message: it would keep a logger of this test when it is gone
     for c in (0.16, 0.12):
         fits = False
         with suppress(FMICallException):
             rows = fmpy.simulate_fmu(
                 str(file), stop_time=0.01, fmi_type="CoSimulation", output=["tau"], start_values={"c": c},
-                logger=lambda *args: logged.append(str(args[-1])),
             )  # fmt: skip
             fits = bool(np.all(np.isfinite(rows["tau"])))
         assert fits == (c > 0.15)
-    assert make == "python" or "overlap with c = 0.12" in "".join(logged)
+    assert make == "python" or "overlap with c = 0.12" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("text", ["big", "c / 2", "4 kg"])
